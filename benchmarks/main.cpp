@@ -1,0 +1,187 @@
+#include "core/geometry.hpp"
+#include "core/method_limits.hpp"
+#include "core/provenance.hpp"
+#include "core/results.hpp"
+#include "core/run.hpp"
+#include "lpfdm/lpfdm.hpp"
+#include "mpm/mpm.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <iostream>
+#include <unistd.h>
+
+/// The `testbed` command.
+namespace testbed
+{
+namespace
+{
+std::filesystem::path own_directory()
+{
+    return std::filesystem::read_symlink("/proc/self/exe").parent_path();
+}
+
+/// Replaces this process by `program`, looked for beside this executable and then on PATH, with the same arguments.
+[[noreturn]] void become(const std::string& program, std::vector<std::string> arguments)
+{
+    const auto self = std::filesystem::read_symlink("/proc/self/exe");
+    ::setenv("TESTBED", self.c_str(), 0);
+    const auto beside = own_directory() / program;
+    arguments.insert(arguments.begin(), program);
+    std::vector<char*> argv;
+    for (auto& a : arguments)
+        argv.push_back(a.data());
+    argv.push_back(nullptr);
+    std::cout.flush();
+    if (std::filesystem::exists(beside))
+        ::execv(beside.c_str(), argv.data());
+    ::execvp(program.c_str(), argv.data());
+    throw SceneError(fmt::format("'{}' is not built or not installed ({}); the FEM reference needs deal.II, study and report need Python",
+                                 program, std::strerror(errno)));
+}
+
+std::unique_ptr<Solver> make_particle_solver(const Scene& scene)
+{
+    return find_variant(scene.method).family == "mpm" ? make_mpm(scene) : make_lpfdm(scene);
+}
+
+std::string fields_and_modules(const Scene& scene, Solver& solver)
+{
+    std::vector<std::string> fields, modules{find_variant(scene.method).family};
+    for (const Body& body : solver.bodies())
+        const_cast<Points&>(body.points).for_each_field([&](const auto& f) {
+            if (std::find(fields.begin(), fields.end(), f.name()) == fields.end())
+                fields.emplace_back(f.name());
+        });
+    if (scene.gravity)
+        modules.emplace_back("gravity");
+    if (scene.damping)
+        modules.emplace_back("local damping");
+    if (!scene.boundaries.empty())
+        modules.push_back(fmt::format("{} fixities", scene.boundaries.size()));
+    if (scene.body_force)
+        modules.emplace_back("body force expression");
+    if (!scene.probes.empty())
+        modules.push_back(fmt::format("{} probes", scene.probes.size()));
+    if (scene.exact.count(solver.kinematics()))
+        modules.push_back(fmt::format("exact solution ({})", solver.kinematics()));
+    return fmt::format("fields           {}\nmodules          {}\n", fmt::join(fields, ", "), fmt::join(modules, ", "));
+}
+
+void check(const RunOptions& options, bool resolved)
+{
+    const Scene scene = load_and_warn(options);
+    if (resolved)
+    {
+        fmt::print("{}", resolved_toml(scene));
+        return;
+    }
+    const bool is_fem = find_variant(scene.method).family == "fem";
+    fmt::print("scene            {}\nmethod           {}\n", scene.path, variant_label(scene));
+    fmt::print("lattice          {:.0f} x {:.0f} cells of {} m\n", scene.grid.size[0] / scene.grid.cell_size,
+               scene.grid.size[1] / scene.grid.cell_size, scene.grid.cell_size);
+    for (const MaterialSpec& m : scene.materials)
+    {
+        const ElasticModuli moduli(largest_youngs_modulus(scene, m), m.poissons_ratio);
+        fmt::print("material {:<7} {}, M = {:.5g} Pa, c_p = {:.5g} m/s, c_s = {:.5g} m/s\n", m.name, m.law, moduli.constrained(),
+                   std::sqrt(moduli.constrained() / m.density), std::sqrt(moduli.shear() / m.density));
+    }
+    fmt::print("time step        {:.5g} s, critical {:.5g} s, {:.0f} steps\n", time_step(scene), critical_time_step(scene),
+               std::ceil(scene.time.end / time_step(scene)));
+    std::size_t points = 0;
+    for (const BodySpec& body : scene.bodies)
+        points += fill(body, scene.grid).size();
+    fmt::print("points           {}\n", points);
+    if (is_fem)
+    {
+        fmt::print("the FEM reference samples its solution at these points; it keeps no particle fields\n");
+        return;
+    }
+    const std::unique_ptr<Solver> solver = make_particle_solver(scene);
+    solver->prepare(0, time_step(scene));
+    fmt::print("cells in use     {}\nunknowns         {}\n{}", solver->active_cells(), solver->unknowns(), fields_and_modules(scene, *solver));
+    fmt::print("bytes per point  {:.1f} (all arrays, {:.3g} MB)\n", static_cast<double>(solver->bytes()) / static_cast<double>(points),
+               1e-6 * static_cast<double>(solver->bytes()));
+}
+
+void list()
+{
+    fmt::print("methods (for `method` in a scene, or --method)\n");
+    for (const Variant& v : variants())
+        fmt::print("  {:<16} {}\n", v.name, v.description);
+    fmt::print("laws (for `law` of a material)\n");
+    for (const std::string& law : MaterialSpec::laws())
+        fmt::print("  {}\n", law);
+}
+
+std::vector<std::string> rest_of(int argc, char** argv, int from)
+{
+    return {argv + std::min(from, argc), argv + argc};
+}
+
+int run(int argc, char** argv)
+{
+    // study and report are programs of their own, found the way git finds its subcommands
+    if (argc > 1 && (std::string(argv[1]) == "study" || std::string(argv[1]) == "report"))
+        become(std::string("testbed-") + argv[1], rest_of(argc, argv, 2));
+
+    CLI::App app("Verification and research testbed: LPFDM, MPM and FEM for large soil deformation");
+    app.require_subcommand(1);
+    app.set_version_flag("--version", build().commit);
+    RunOptions options;
+    bool resolved = false;
+    std::string table;
+    const auto scene_options = [&](CLI::App* command) {
+        command->add_option("scene", options.scene, "scene file (TOML)")->required();
+        command->add_option("--method", options.method, "method variant, see `testbed list`");
+        command->add_option("--set", options.overrides, "override a key: path.to.key=value; list entries by number or name")
+            ->allow_extra_args(false);
+        command->add_flag("--strict", options.strict, "warnings are errors");
+    };
+    CLI::App* run_command = app.add_subcommand("run", "run a scene and write a result file");
+    scene_options(run_command);
+    run_command->add_option("-o,--output", options.output, "result file (default CASE_METHOD.h5)");
+    run_command->add_option("--threads", options.threads, "OpenMP threads; the result does not depend on it")->check(CLI::Range(1, 1024));
+    run_command->add_flag("--quiet", options.quiet, "no progress, no summary");
+    CLI::App* check_command = app.add_subcommand("check", "parse a scene and say what it would use");
+    scene_options(check_command);
+    check_command->add_flag("--resolved", resolved, "print the scene with all its defaults, as TOML");
+    CLI::App* doc_command = app.add_subcommand("doc", "every table and key of a scene");
+    doc_command->add_option("table", table, "only this table");
+    app.add_subcommand("list", "methods and material laws");
+    app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
+    app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
+    try
+    {
+        app.parse(argc, argv);
+    }
+    catch (const CLI::ParseError& e)
+    {
+        return app.exit(e) == 0 ? 0 : static_cast<int>(ExitCode::bad_scene);
+    }
+    if (run_command->parsed())
+    {
+        const std::string method = load_scene(options.scene, options.method, options.overrides).scene.method;
+        if (find_variant(method).family == "fem")
+            become("testbed-fem", rest_of(argc, argv, 2));
+        return static_cast<int>(run_scene(options, make_particle_solver));
+    }
+    if (check_command->parsed())
+        check(options, resolved);
+    else if (doc_command->parsed())
+        fmt::print("{}", scene_documentation(table));
+    else
+        list();
+    return 0;
+}
+}  // namespace
+}  // namespace testbed
+
+int main(int argc, char** argv)
+{
+    return testbed::guarded_main([&] { return testbed::run(argc, argv); });
+}

@@ -1,0 +1,39 @@
+#pragma once
+/// A body: points of one material, the paper's cluster. Bodies on one lattice are perfectly bonded.
+
+#include "core/bins.hpp"
+#include "core/materials/material.hpp"
+#include "core/scene.hpp"
+
+namespace testbed
+{
+struct Body
+{
+    std::string name;
+    Points points;
+    Material material;
+    Bins bins;
+};
+
+/// What a method asks of each point beyond position and stress.
+struct PointNeeds
+{
+    bool box = false;       ///< half widths; the volume then follows from them
+    bool velocity = false;  ///< velocity on the points
+};
+
+Lattice make_lattice(const GridSpec& grid);
+
+/// The bodies of a scene with their initial velocity if the method keeps it on the points.
+/// @throws SceneError when a body has no points or a material parameter is out of range at a point
+std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointNeeds needs);
+
+/// Expression of velocity or position-dependent parameter at the initial position of points.
+struct VectorExpression
+{
+    Expression x, y;
+
+    VectorExpression(const Expr2& text, const Constants& constants) : x(text[0], constants), y(text[1], constants) {}
+    Vec2 operator()(const Place& place) const { return {x(place), y(place)}; }
+};
+}  // namespace testbed

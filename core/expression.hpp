@@ -1,0 +1,47 @@
+#pragma once
+/// Text expressions of scenes, evaluated by muParser. They know X, Y (initial position), x, y (current position), t and the
+/// scene's constants. Not for use by several threads at once.
+
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace testbed
+{
+using Constants = std::vector<std::pair<std::string, double>>;  ///< in order of definition
+
+struct ExpressionError : std::runtime_error
+{
+    using std::runtime_error::runtime_error;
+};
+
+/// Where and when an expression is evaluated.
+struct Place
+{
+    double X = 0, Y = 0, x = 0, y = 0, t = 0;
+};
+
+class Expression
+{
+public:
+    /// @throws ExpressionError for text that does not parse or names something unknown.
+    Expression(const std::string& text, const Constants& constants);
+    ~Expression();
+    Expression(Expression&&) noexcept;
+    Expression& operator=(Expression&&) noexcept;
+
+    double operator()(const Place& place) const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Whether a condition holds at a place or within `reach` of it [m]: a node at 0.30000000000000004 is on the line x <= 0.3.
+bool holds_near(const Expression& condition, double x, double y, double reach);
+
+/// Value of an expression of constants alone. @throws ExpressionError
+double evaluate_constant(const std::string& text, const Constants& constants);
+}  // namespace testbed

@@ -1,0 +1,151 @@
+#pragma once
+/// Isotropic elasticity in plane strain: the stress rate D : d with the rotation of the stress left out (`linear_elastic`), to
+/// first order (`hypoelastic_jaumann`) or exact (`hypoelastic_exact_rotation`). The out-of-plane stress needs no storage:
+/// it starts from zero, so sigma_zz = nu (sigma_xx + sigma_yy) for all three.
+
+#include "core/points.hpp"
+#include "core/types.hpp"
+
+#include <cmath>
+
+namespace testbed
+{
+class ElasticModuli
+{
+public:
+    ElasticModuli() = default;
+    /// @param youngs_modulus [Pa] @param poissons_ratio in (-1, 1/2)
+    ElasticModuli(double youngs_modulus, double poissons_ratio)
+        : youngs_modulus_(youngs_modulus),
+          poissons_ratio_(poissons_ratio),
+          shear_(youngs_modulus / (2 * (1 + poissons_ratio))),
+          lame_(2 * shear_ * poissons_ratio / (1 - 2 * poissons_ratio))
+    {
+    }
+    double youngs_modulus() const { return youngs_modulus_; }
+    double poissons_ratio() const { return poissons_ratio_; }
+    double shear() const { return shear_; }                      ///< G, mu
+    double lame() const { return lame_; }                        ///< lambda
+    double constrained() const { return lame_ + 2 * shear_; }    ///< M
+
+private:
+    double youngs_modulus_ = 0, poissons_ratio_ = 0, shear_ = 0, lame_ = 0;
+};
+
+/// Elastic energy per volume of a plane-strain stress [Pa].
+inline double elastic_energy_density(const ElasticModuli& m, const SymTensor<>& s)
+{
+    const double szz = m.poissons_ratio() * (s.xx + s.yy);
+    const double normal = s.xx * s.xx + s.yy * s.yy + szz * szz;
+    const double mixed = s.xx * s.yy + (s.xx + s.yy) * szz;
+    return (normal - 2 * m.poissons_ratio() * mixed) / (2 * m.youngs_modulus()) + s.xy * s.xy / (2 * m.shear());
+}
+
+struct NoRotation
+{
+    template <class T>
+    static void rotate(SymTensor<T>&, T)
+    {
+    }
+};
+
+/// Increment of the Jaumann rate, W s - s W with the spin increment `angle` (anticlockwise).
+struct JaumannRotation
+{
+    template <class T>
+    static void rotate(SymTensor<T>& s, T angle)
+    {
+        const T dxx = T(-2.0) * angle * s.xy, dxy = angle * (s.xx - s.yy);
+        s.xx += dxx;
+        s.yy -= dxx;
+        s.xy += dxy;
+    }
+};
+
+/// R s R^T with R orthogonal to rounding and its angle right to angle^7.
+struct ExactRotation
+{
+    template <class T>
+    static void rotate(SymTensor<T>& s, T angle)
+    {
+        const T square = angle * angle;
+        const T t = angle * (T(0.5) + square * (T(1.0 / 24) + square * T(1.0 / 240)));  // tan(angle / 2)
+        const T norm = T(1.0) / (T(1.0) + t * t);
+        const T c = (T(1.0) - t * t) * norm, d = T(2.0) * t * norm;
+        const T mean = T(0.5) * (s.xx + s.yy), half = T(0.5) * (s.xx - s.yy);
+        const T c2 = c * c - d * d, d2 = T(2.0) * c * d;
+        const T rotated = half * c2 - s.xy * d2;
+        s.xy = half * d2 + s.xy * c2;
+        s.xx = mean + rotated;
+        s.yy = mean - rotated;
+    }
+};
+
+template <class Rotation>
+struct Hypoelastic
+{
+    ElasticModuli moduli;
+
+    template <class T>
+    struct State
+    {
+        SymTensor<T> stress;
+    };
+
+    /// The pure point function: stress after the displacement gradient increment d.
+    template <class T>
+    void update(State<T>& state, const Gradient<T>& d) const
+    {
+        update(state, d, T(1.0));
+    }
+
+    template <class T>
+    void update(State<T>& state, const Gradient<T>& d, T stiffness) const
+    {
+        SymTensor<T>& s = state.stress;
+        Rotation::rotate(s, d.rotation());
+        const T lame = stiffness * T(moduli.lame()), shear = stiffness * T(moduli.shear());
+        s.xx += lame * d.trace() + T(2.0) * shear * d.xx;
+        s.yy += lame * d.trace() + T(2.0) * shear * d.yy;
+        s.xy += shear * d.shear();
+    }
+
+    /// The same on the points [p, p + lanes).
+    template <class Lanes>
+    void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    {
+        State<Pack> state = load(q, p, lanes);
+        update(state, d);
+        store(q, p, lanes, state);
+    }
+
+protected:
+    template <class Lanes>
+    static State<Pack> load(const Points& q, std::size_t p, const Lanes& lanes)
+    {
+        return {{lanes.load(&q.sxx[p]), lanes.load(&q.syy[p]), lanes.load(&q.sxy[p])}};
+    }
+    template <class Lanes>
+    static void store(Points& q, std::size_t p, const Lanes& lanes, const State<Pack>& state)
+    {
+        lanes.store(&q.sxx[p], state.stress.xx);
+        lanes.store(&q.syy[p], state.stress.yy);
+        lanes.store(&q.sxy[p], state.stress.xy);
+    }
+};
+
+/// The same law with a Young's modulus that varies from point to point.
+template <class Law>
+struct VaryingStiffness : Law
+{
+    using Law::update;
+
+    template <class Lanes>
+    void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    {
+        auto state = Law::load(q, p, lanes);
+        Law::update(state, d, lanes.load(&q.stiffness[p]));
+        Law::store(q, p, lanes, state);
+    }
+};
+}  // namespace testbed

@@ -1,0 +1,32 @@
+#pragma once
+/// The closed set of laws. A body holds one of them; a kernel visits it once per launch.
+
+#include "core/materials/elastic.hpp"
+
+#include <concepts>
+#include <variant>
+
+namespace testbed
+{
+using LinearElastic = Hypoelastic<NoRotation>;
+using HypoelasticJaumann = Hypoelastic<JaumannRotation>;
+using HypoelasticExactRotation = Hypoelastic<ExactRotation>;
+
+using Material = std::variant<LinearElastic, HypoelasticJaumann, HypoelasticExactRotation, VaryingStiffness<LinearElastic>,
+                              VaryingStiffness<HypoelasticJaumann>, VaryingStiffness<HypoelasticExactRotation>>;
+
+/// What a law must offer: a pure point function (FEM quadrature calls it, too) and its batch form.
+template <class Law>
+concept MaterialLaw = requires(const Law law, typename Law::template State<double> state, Points points,
+                               Gradient<double> d, Gradient<Pack> packs) {
+    { law.moduli } -> std::convertible_to<ElasticModuli>;
+    law.update(state, d);
+    law.update(points, std::size_t{}, AllLanes{}, packs);
+};
+static_assert(MaterialLaw<LinearElastic> && MaterialLaw<VaryingStiffness<HypoelasticJaumann>>);
+
+inline const ElasticModuli& moduli(const Material& material)
+{
+    return std::visit([](const auto& law) -> const ElasticModuli& { return law.moduli; }, material);
+}
+}  // namespace testbed

@@ -1,0 +1,261 @@
+#include "core/observer.hpp"
+
+#include <cmath>
+#include <fmt/format.h>
+
+namespace testbed
+{
+namespace
+{
+/// Sums over all points of all bodies: strain energy [J/m] and sum of m u [kg].
+struct PointSums
+{
+    double strain_energy = 0, max_stress = 0;
+    Vec2 moment{0, 0};
+};
+
+PointSums point_sums(const std::vector<Body>& bodies)
+{
+    PointSums total;
+    for (const Body& body : bodies)
+    {
+        const Points& q = body.points;
+        const ElasticModuli base = moduli(body.material);
+        const auto s = ordered_sum<3>(q.count, [&](std::size_t p) {
+            const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
+            const double energy = elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}) / softer;
+            return std::array<double, 3>{energy * q.current_volume(p), q.mass * (q.x[p] - q.X[p]), q.mass * (q.y[p] - q.Y[p])};
+        });
+        total.strain_energy += s[0];
+        total.moment[0] += s[1];
+        total.moment[1] += s[2];
+        total.max_stress = std::max(total.max_stress, parallel_max(q.count, [&](std::size_t p) {
+            return std::max({std::abs(q.sxx[p]), std::abs(q.syy[p]), std::abs(q.sxy[p])});
+        }));
+    }
+    return total;
+}
+}  // namespace
+
+Observer::Observer(const Scene& scene, const Solver& solver) : scene_(scene), solver_(solver)
+{
+    const Constants constants = scene.expression_constants();
+    if (const auto found = scene.exact.find(solver.kinematics()); found != scene.exact.end())
+    {
+        if (found->second.displacement)
+            for (const auto& text : *found->second.displacement)
+                exact_.displacement.emplace_back(text, constants);
+        if (found->second.stress)
+            for (const auto& text : *found->second.stress)
+                exact_.stress.emplace_back(text, constants);
+    }
+    if (scene.gravity)
+        gravity_ = {scene.gravity->acceleration, scene.gravity->ramp};
+    history_ = {{"time", "s"},
+                {"kinetic_energy", "J/m"},
+                {"strain_energy", "J/m"},
+                {"gravity_work", "J/m"},
+                {"linear_momentum", "kg/s", 3},
+                {"angular_momentum", "kg m/s"},
+                {"unbalanced_force", "-"},
+                {"max_stress", "Pa"}};
+    for (const ProbeSpec& spec : scene.probes)
+    {
+        const Expression where(spec.where, constants);
+        Probe probe{spec.name};
+        for (const Body& body : solver.bodies())
+            for (std::size_t p = 0; p < body.points.count; ++p)
+                if (const double X = body.points.X[p], Y = body.points.Y[p]; where({.X = X, .Y = Y, .x = X, .y = Y}) != 0)
+                    probe.ids.push_back(body.points.id[p]);
+        if (probe.ids.empty())
+            throw SceneError(fmt::format("{}: probe '{}': where = \"{}\" holds at no point", scene.path, spec.name, spec.where));
+        std::sort(probe.ids.begin(), probe.ids.end());
+        probe.series = {{"displacement", "m", 3}, {"velocity", "m/s", 3}, {"stress", "Pa", 6}};
+        if (!exact_.displacement.empty())
+            probe.series.push_back({"exact_displacement", "m", 3});
+        if (!exact_.stress.empty())
+            probe.series.push_back({"exact_stress", "Pa", 6});
+        probes_.push_back(std::move(probe));
+    }
+}
+
+std::vector<Observer::Location> Observer::locations() const
+{
+    std::size_t n = 0;
+    for (const Body& body : solver_.bodies())
+        n += body.points.count;
+    std::vector<Location> where(n);
+    for (std::uint32_t b = 0; b < solver_.bodies().size(); ++b)
+    {
+        const Points& q = solver_.bodies()[b].points;
+        for (std::uint32_t p = 0; p < q.count; ++p)
+            where[q.id[p]] = {b, p};
+    }
+    return where;
+}
+
+Place Observer::place(const Location& at, double t) const
+{
+    const Points& q = solver_.bodies()[at.body].points;
+    return {q.X[at.point], q.Y[at.point], q.x[at.point], q.y[at.point], t};
+}
+
+std::array<double, 6> Observer::stress(const Location& at) const
+{
+    const Body& body = solver_.bodies()[at.body];
+    const Points& q = body.points;
+    const double xx = q.sxx[at.point], yy = q.syy[at.point];
+    return {xx, q.sxy[at.point], 0, yy, 0, moduli(body.material).poissons_ratio() * (xx + yy)};
+}
+
+std::array<double, 6> Observer::exact_stress(const Place& at) const
+{
+    const auto& e = exact_.stress;  // xx, yy, zz, xy
+    return {e[0](at), e[3](at), 0, e[1](at), 0, e[2](at)};
+}
+
+std::array<double, 3> Observer::exact_displacement(const Place& at) const
+{
+    return {exact_.displacement[0](at), exact_.displacement[1](at), 0};
+}
+
+void Observer::sample(double t)
+{
+    const MotionSums motion = solver_.sums();
+    const PointSums state = point_sums(solver_.bodies());
+    if (!std::isfinite(motion.kinetic_energy) || !std::isfinite(state.strain_energy))
+        throw Diverged(fmt::format("energy is not finite at t = {:.6g} s", t));
+    const double f = 0.5 * (gravity_.factor(last_time_) + gravity_.factor(t));
+    for (std::size_t k = 0; k < 2; ++k)
+        gravity_work_ += f * gravity_.acceleration[k] * (state.moment[k] - last_moment_[k]);
+    last_time_ = t;
+    last_moment_ = state.moment;
+    const double row[] = {t, motion.kinetic_energy, state.strain_energy, gravity_work_};
+    for (std::size_t k = 0; k < 4; ++k)
+        history_[k].values.push_back(row[k]);
+    history_[4].values.insert(history_[4].values.end(), {motion.momentum[0], motion.momentum[1], 0});
+    history_[5].values.push_back(motion.angular_momentum);
+    history_[6].values.push_back(motion.unbalanced);
+    history_[7].values.push_back(state.max_stress);
+    if (!probes_.empty())
+        sample_probes(t);
+}
+
+void Observer::sample_probes(double t)
+{
+    const std::vector<Location> where = locations();
+    for (Probe& probe : probes_)
+    {
+        std::vector<std::vector<double>> mean;
+        for (const Series& s : probe.series)
+            mean.emplace_back(s.columns, 0.0);
+        for (const std::uint32_t id : probe.ids)
+        {
+            const Location at = where[id];
+            const Place here = place(at, t);
+            const Vec2 v = solver_.velocity(at.body, at.point);
+            const auto add = [&](std::size_t k, const auto& values) {
+                for (std::size_t c = 0; c < values.size(); ++c)
+                    mean[k][c] += values[c] / static_cast<double>(probe.ids.size());
+            };
+            add(0, std::array<double, 3>{here.x - here.X, here.y - here.Y, 0});
+            add(1, std::array<double, 3>{v[0], v[1], 0});
+            add(2, stress(at));
+            std::size_t next = 3;
+            if (!exact_.displacement.empty())
+                add(next++, exact_displacement(here));
+            if (!exact_.stress.empty())
+                add(next, exact_stress(here));
+        }
+        for (std::size_t k = 0; k < mean.size(); ++k)
+            probe.series[k].values.insert(probe.series[k].values.end(), mean[k].begin(), mean[k].end());
+    }
+}
+
+double Observer::kinetic_ratio(const Solver& solver)
+{
+    const double strain = point_sums(solver.bodies()).strain_energy;
+    return strain > 0 ? solver.sums().kinetic_energy / strain : std::numeric_limits<double>::infinity();
+}
+
+void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
+{
+    const std::vector<Location> where = locations();
+    const std::string group = fmt::format("/snapshots/{:04}", snapshot_times_.size());
+    file.attribute(group, "time", t);
+    file.attribute(group, "step", step);
+    snapshot_fields_.clear();
+    const auto write = [&](const char* name, const char* unit, std::size_t columns, auto&& row_of) {
+        std::vector<double> values;
+        values.reserve(where.size() * columns);
+        for (const Location& at : where)
+        {
+            const auto row = row_of(at);
+            values.insert(values.end(), row.begin(), row.end());
+        }
+        file.dataset(group + "/" + name, unit, values, columns);
+        snapshot_fields_.emplace_back(name);
+    };
+    using Row1 = std::array<double, 1>;
+    using Row3 = std::array<double, 3>;
+    const auto points = [&](const Location& at) -> const Points& { return solver_.bodies()[at.body].points; };
+    write("position", "m", 3, [&](const Location& at) { const Place x = place(at, t); return Row3{x.x, x.y, 0}; });
+    write("initial_position", "m", 3, [&](const Location& at) { const Place x = place(at, t); return Row3{x.X, x.Y, 0}; });
+    write("displacement", "m", 3, [&](const Location& at) { const Place x = place(at, t); return Row3{x.x - x.X, x.y - x.Y, 0}; });
+    write("velocity", "m/s", 3, [&](const Location& at) { const Vec2 v = solver_.velocity(at.body, at.point); return Row3{v[0], v[1], 0}; });
+    write("stress", "Pa", 6, [&](const Location& at) { return stress(at); });
+    write("volume", "m^2", 1, [&](const Location& at) { return Row1{points(at).current_volume(at.point)}; });
+    write("initial_volume", "m^2", 1, [&](const Location& at) { return Row1{points(at).initial_volume}; });
+    write("mass", "kg/m", 1, [&](const Location& at) { return Row1{points(at).mass}; });
+    if (!exact_.displacement.empty())
+        write("exact_displacement", "m", 3, [&](const Location& at) { return exact_displacement(place(at, t)); });
+    if (!exact_.stress.empty())
+        write("exact_stress", "Pa", 6, [&](const Location& at) { return exact_stress(place(at, t)); });
+    std::vector<std::uint32_t> id(where.size()), body(where.size());
+    for (std::uint32_t n = 0; n < where.size(); ++n)
+    {
+        id[n] = n;
+        body[n] = where[n].body;
+    }
+    file.dataset(group + "/id", "-", id);
+    file.dataset(group + "/body", "-", body);
+    file.flush();
+    snapshot_times_.push_back(t);
+}
+
+void Observer::write_history(ResultFile& file) const
+{
+    for (const Series& s : history_)
+        file.dataset("/history/" + s.name, s.unit, s.values, s.columns);
+    for (const Probe& probe : probes_)
+        for (const Series& s : probe.series)
+            file.dataset("/history/probes/" + probe.name + "/" + s.name, s.unit, s.values, s.columns);
+}
+
+std::string Observer::xdmf(const std::string& name) const
+{
+    std::size_t n = 0;
+    for (const Body& body : solver_.bodies())
+        n += body.points.count;
+    std::string text = "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n<Grid Name=\"points\" GridType=\"Collection\" "
+                       "CollectionType=\"Temporal\">\n";
+    for (std::size_t k = 0; k < snapshot_times_.size(); ++k)
+    {
+        const auto item = [&](const std::string& field, std::size_t columns, const char* type = "Float") {
+            return fmt::format("<DataItem Format=\"HDF\" NumberType=\"{}\" Precision=\"{}\" Dimensions=\"{}{}\">{}:/snapshots/{:04}/{}</DataItem>",
+                               type, *type == 'F' ? 8 : 4, n, columns > 1 ? fmt::format(" {}", columns) : "", name, k, field);
+        };
+        text += fmt::format("<Grid Name=\"{:04}\">\n<Time Value=\"{}\"/>\n<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{}\"/>\n"
+                            "<Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
+                            k, snapshot_times_[k], n, item("position", 3));
+        for (const std::string& field : snapshot_fields_)
+        {
+            const bool tensor = field.ends_with("stress"), scalar = field.ends_with("volume") || field == "mass";
+            text += fmt::format("<Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", field,
+                                tensor ? "Tensor6" : scalar ? "Scalar" : "Vector", item(field, tensor ? 6 : scalar ? 1 : 3));
+        }
+        text += fmt::format("<Attribute Name=\"body\" AttributeType=\"Scalar\" Center=\"Node\">{}</Attribute>\n</Grid>\n", item("body", 1, "UInt"));
+    }
+    return text + "</Grid>\n</Domain>\n</Xdmf>\n";
+}
+}  // namespace testbed

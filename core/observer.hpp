@@ -1,0 +1,67 @@
+#pragma once
+/// What is recorded of a run: the history of sums and probes, and snapshots of all points in the order of their ids.
+
+#include "core/node_ops.hpp"
+#include "core/results.hpp"
+#include "core/solver.hpp"
+
+namespace testbed
+{
+class Observer
+{
+public:
+    /// @throws SceneError when a probe has no points
+    Observer(const Scene& scene, const Solver& solver);
+
+    /// Adds one sample to the history. @throws Diverged for a value that is not finite
+    void sample(double t);
+    /// Kinetic over strain energy at the last sample's state.
+    static double kinetic_ratio(const Solver& solver);
+    void snapshot(ResultFile& file, double t, std::int64_t step);
+    void write_history(ResultFile& file) const;
+
+    std::size_t snapshots() const { return snapshot_times_.size(); }
+    /// The file that shows the snapshots in ParaView. @param name of the HDF5 file, without folder
+    std::string xdmf(const std::string& name) const;
+
+private:
+    struct Series
+    {
+        std::string name, unit;
+        std::size_t columns = 1;
+        std::vector<double> values{};
+    };
+    struct Probe
+    {
+        std::string name;
+        std::vector<std::uint32_t> ids{};
+        std::vector<Series> series{};
+    };
+    struct Exact
+    {
+        std::vector<Expression> displacement{}, stress{};
+    };
+    struct Location
+    {
+        std::uint32_t body, point;
+    };
+
+    std::vector<Location> locations() const;
+    Place place(const Location& at, double t) const;
+    std::array<double, 6> stress(const Location& at) const;
+    std::array<double, 6> exact_stress(const Place& at) const;
+    std::array<double, 3> exact_displacement(const Place& at) const;
+    void sample_probes(double t);
+
+    const Scene& scene_;
+    const Solver& solver_;
+    Exact exact_;
+    Gravity gravity_{{0, 0}, 0};
+    std::vector<Series> history_;
+    std::vector<Probe> probes_;
+    std::vector<double> snapshot_times_;
+    std::vector<std::string> snapshot_fields_;
+    double gravity_work_ = 0, last_time_ = 0;
+    Vec2 last_moment_{0, 0};
+};
+}  // namespace testbed

@@ -1,0 +1,39 @@
+#pragma once
+/// Material points of one body, a structure of arrays. Mass and initial volume are the same for all points of a body;
+/// everything else is a field, present only when the method, the material or the scene needs it.
+
+#include "core/field.hpp"
+
+namespace testbed
+{
+struct Points
+{
+    Field<double> x{"x", "m"}, y{"y", "m"};                          ///< current position
+    Field<double> X{"X", "m"}, Y{"Y", "m"};                          ///< initial position
+    Field<double> sxx{"stress_xx", "Pa"}, syy{"stress_yy", "Pa"}, sxy{"stress_xy", "Pa"};
+    Field<double> volume{"volume", "m^2"};                           ///< current, per metre of thickness
+    Field<double> half_x{"half_width_x", "m"}, half_y{"half_width_y", "m"};  ///< the point's own box, if it has one
+    Field<double> vx{"velocity_x", "m/s"}, vy{"velocity_y", "m/s"};  ///< MPM: the velocity lives on the points
+    Field<double> stiffness{"stiffness_ratio", "-"};                 ///< E(X, Y) / E of the material
+    Field<std::uint32_t> id{"id", "-"};
+
+    std::size_t count = 0;
+    double mass = 0;            ///< of one point [kg/m]
+    double initial_volume = 0;  ///< of one point [m^2]
+
+    /// The one list that reordering, output and accounting walk.
+    template <class F>
+    void for_each_field(F&& f)
+    {
+        for (Field<double>* field :
+             {&x, &y, &X, &Y, &sxx, &syy, &sxy, &volume, &half_x, &half_y, &vx, &vy, &stiffness})
+            if (field->active())
+                f(*field);
+        if (id.active())
+            f(id);
+    }
+
+    /// Volume of point p; a point with a box needs no volume of its own.
+    double current_volume(std::size_t p) const { return half_x.active() ? 4 * half_x[p] * half_y[p] : volume[p]; }
+};
+}  // namespace testbed

@@ -1,0 +1,18 @@
+#pragma once
+/// Where a number comes from: the state of the sources and of the machine.
+
+#include <string>
+
+namespace testbed
+{
+struct Build
+{
+    const char *commit, *compiler, *flags, *type;
+};
+/// Made by the build itself.
+const Build& build();
+
+std::string cpu_name();
+double load_average();     ///< over one minute
+std::string time_stamp();  ///< now, ISO 8601, UTC
+}  // namespace testbed

@@ -1,0 +1,173 @@
+#include "core/results.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <fmt/format.h>
+#include <hdf5.h>
+#include <unistd.h>
+
+namespace testbed
+{
+namespace
+{
+/// An HDF5 handle with the function that closes it.
+class Handle
+{
+public:
+    Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close)
+    {
+        if (id < 0)
+            throw OutputError("cannot write the result file (disk full?)");
+    }
+    ~Handle() { close_(id_); }
+    Handle(const Handle&) = delete;
+    Handle& operator=(const Handle&) = delete;
+    operator hid_t() const { return id_; }
+
+private:
+    hid_t id_;
+    herr_t (*close_)(hid_t);
+};
+
+void check(herr_t status)
+{
+    if (status < 0)
+        throw OutputError("cannot write the result file (disk full?)");
+}
+}  // namespace
+
+struct ResultFile::Impl
+{
+    std::string path, part;
+    hid_t file = -1;
+
+    Handle group(const std::string& name) const
+    {
+        if (name == "/" || H5Lexists(file, name.c_str(), H5P_DEFAULT) > 0)
+            return {H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose};
+        const auto slash = name.rfind('/');
+        if (slash != 0 && slash != std::string::npos)
+            group(name.substr(0, slash));
+        return {H5Gcreate2(file, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose};
+    }
+    static void write_attribute(hid_t owner, const std::string& name, hid_t type, hid_t space, const void* data)
+    {
+        if (H5Aexists(owner, name.c_str()) > 0)
+            check(H5Adelete(owner, name.c_str()));
+        const Handle attribute(H5Acreate2(owner, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+        check(H5Awrite(attribute, type, data));
+    }
+    static void write_text(hid_t owner, const std::string& name, const std::string& value)
+    {
+        const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+        check(H5Tset_size(type, H5T_VARIABLE));
+        check(H5Tset_cset(type, H5T_CSET_UTF8));
+        const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+        const char* text = value.c_str();
+        write_attribute(owner, name, type, space, &text);
+    }
+    void write_dataset(const std::string& name, const std::string& unit, hid_t type, const void* data, std::size_t rows,
+                       std::size_t columns) const
+    {
+        group(name.substr(0, name.rfind('/')));
+        const hsize_t size[2] = {rows, columns};
+        const Handle space(H5Screate_simple(columns > 1 ? 2 : 1, size, nullptr), H5Sclose);
+        const Handle set(H5Dcreate2(file, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+        check(H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data));
+        write_text(set, "unit", unit);
+    }
+    void close()
+    {
+        if (file < 0)
+            return;
+        const bool flushed = H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0;
+        const bool closed = H5Fclose(file) >= 0;
+        file = -1;
+        if (!flushed || !closed)
+            throw OutputError("cannot write the result file (disk full?)");
+    }
+};
+
+ResultFile::ResultFile(const std::string& path) : impl_(std::make_unique<Impl>(Impl{path, path + ".part"}))
+{
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    // the plain call first: it tells why, and HDF5 does not
+    const int descriptor = ::open(impl_->part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (descriptor < 0)
+        throw OutputError(fmt::format("cannot write '{}': {}", impl_->part, std::strerror(errno)));
+    ::close(descriptor);
+    impl_->file = H5Fcreate(impl_->part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    if (impl_->file < 0)
+    {
+        std::filesystem::remove(impl_->part);
+        throw OutputError(fmt::format("cannot write '{}'", impl_->part));
+    }
+}
+
+ResultFile::ResultFile(ResultFile&&) noexcept = default;
+
+ResultFile::~ResultFile()
+{
+    if (!impl_)
+        return;
+    try
+    {
+        impl_->close();
+    }
+    catch (const OutputError&)
+    {
+    }
+    std::error_code ignored;
+    std::filesystem::remove(impl_->part, ignored);
+}
+
+void ResultFile::attribute(const std::string& group, const std::string& name, const std::string& value)
+{
+    Impl::write_text(impl_->group(group), name, value);
+}
+void ResultFile::attribute(const std::string& group, const std::string& name, double value)
+{
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    Impl::write_attribute(impl_->group(group), name, H5T_NATIVE_DOUBLE, space, &value);
+}
+void ResultFile::attribute(const std::string& group, const std::string& name, std::int64_t value)
+{
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    Impl::write_attribute(impl_->group(group), name, H5T_NATIVE_INT64, space, &value);
+}
+void ResultFile::attribute(const std::string& group, const std::string& name, std::span<const double> values)
+{
+    const hsize_t size = values.size();
+    const Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose);
+    Impl::write_attribute(impl_->group(group), name, H5T_NATIVE_DOUBLE, space, values.data());
+}
+void ResultFile::dataset(const std::string& path, const std::string& unit, std::span<const double> values, std::size_t columns)
+{
+    impl_->write_dataset(path, unit, H5T_NATIVE_DOUBLE, values.data(), values.size() / columns, columns);
+}
+void ResultFile::dataset(const std::string& path, const std::string& unit, std::span<const std::uint32_t> values)
+{
+    impl_->write_dataset(path, unit, H5T_NATIVE_UINT32, values.data(), values.size(), 1);
+}
+void ResultFile::flush()
+{
+    check(H5Fflush(impl_->file, H5F_SCOPE_GLOBAL));
+}
+
+void ResultFile::commit()
+{
+    impl_->close();
+    const int descriptor = ::open(impl_->part.c_str(), O_RDONLY | O_CLOEXEC);
+    const bool synced = descriptor >= 0 && ::fsync(descriptor) == 0;
+    if (descriptor >= 0)
+        ::close(descriptor);
+    if (!synced)
+        throw OutputError(fmt::format("cannot write '{}': {}", impl_->part, std::strerror(errno)));
+    std::error_code failed;
+    std::filesystem::rename(impl_->part, impl_->path, failed);
+    if (failed)
+        throw OutputError(fmt::format("cannot write '{}': {}", impl_->path, failed.message()));
+}
+}  // namespace testbed

@@ -1,0 +1,279 @@
+#include "core/run.hpp"
+
+#include "core/method_limits.hpp"
+#include "core/observer.hpp"
+#include "core/provenance.hpp"
+
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fstream>
+#include <unistd.h>
+
+namespace testbed
+{
+namespace
+{
+std::atomic<bool> interrupted{false};
+
+/// Ctrl-C and termination finish the step; a full disk or file limit is an error of write(), not a signal.
+void catch_signals()
+{
+    std::signal(SIGINT, [](int) { interrupted = true; });
+    std::signal(SIGTERM, [](int) { interrupted = true; });
+    std::signal(SIGXFSZ, SIG_IGN);
+}
+
+/// One line that is overwritten, on a terminal only.
+class Progress
+{
+public:
+    Progress(bool on, double end) : on_(on && isatty(STDERR_FILENO)), end_(end) {}
+    void show(double t, std::int64_t step)
+    {
+        if (!on_ || watch_.seconds() < last_ + 0.2)
+            return;
+        last_ = watch_.seconds();
+        fmt::print(stderr, "\r{:5.1f} %  t = {:.4g} s  step {}  {:.0f} s left ", 100 * t / end_, t, step,
+                   t > 0 ? last_ * (end_ - t) / t : 0.0);
+        std::fflush(stderr);
+    }
+    void clear() const
+    {
+        if (on_)
+            fmt::print(stderr, "\r{:60}\r", "");
+    }
+
+private:
+    bool on_;
+    double end_, last_ = 0;
+    Stopwatch watch_;
+};
+
+struct Outcome
+{
+    std::string status = "completed", reason;
+    ExitCode code = ExitCode::completed;
+    std::int64_t steps = 0;
+    double solve_seconds = 0, output_seconds = 0, dt = 0;
+};
+
+/// Steps from 0 to the end; the history and the snapshots go to the observer.
+Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, ResultFile& file, bool quiet)
+{
+    Outcome out;
+    const double end = scene.time.end;
+    out.dt = solver.is_static() ? end : time_step(scene);
+    const auto total_steps = static_cast<std::int64_t>(std::ceil(end / out.dt * (1 - 1e-12)));
+    if (!scene.time.dt)
+        out.dt = end / static_cast<double>(total_steps);
+    const double history_interval = scene.output.history > 0 ? scene.output.history : end / 200;
+    const double snapshot_interval = scene.output.snapshots > 0 ? end / scene.output.snapshots : 2 * end;
+    const double half = 0.5 * out.dt;
+    double next_sample = 0, next_snapshot = 0, t = 0;
+    Progress progress(!quiet, end);
+    const Stopwatch watch;
+    const auto record = [&](bool last) {
+        const Stopwatch output;
+        if (t + half >= next_sample || last)
+        {
+            observer.sample(t);
+            next_sample += history_interval;
+        }
+        if (t + half >= next_snapshot || last)
+        {
+            observer.snapshot(file, t, out.steps);
+            next_snapshot += snapshot_interval;
+        }
+        out.output_seconds += output.seconds();
+    };
+    const auto is_at_rest = [&] {
+        const double tolerance = *scene.time.stop_unbalanced;
+        return solver.sums().unbalanced < tolerance && Observer::kinetic_ratio(solver) < tolerance &&
+               (!scene.gravity || t >= scene.gravity->ramp);
+    };
+    try
+    {
+        for (;; ++out.steps)
+        {
+            t = static_cast<double>(out.steps) * out.dt;
+            solver.prepare(t, out.dt);
+            const bool now_and_then = out.steps % 50 == 0;
+            const bool limit = scene.time.wall_clock_limit && now_and_then && watch.seconds() > *scene.time.wall_clock_limit;
+            const bool rest = scene.time.stop_unbalanced && out.steps > 0 && now_and_then && is_at_rest();
+            const bool last = out.steps >= total_steps || interrupted || limit || rest;
+            record(last);
+            if (interrupted)
+                out.status = "interrupted", out.code = ExitCode::interrupted, out.reason = fmt::format("stopped by the user at t = {:.6g} s", t);
+            else if (limit)
+                out.status = "time_limit", out.code = ExitCode::time_limit, out.reason = fmt::format("wall clock limit at t = {:.6g} s", t);
+            if (last)
+                break;
+            solver.advance(out.dt);
+            progress.show(t, out.steps);
+        }
+    }
+    catch (const Diverged& e)
+    {
+        out.status = "diverged";
+        out.code = ExitCode::diverged;
+        out.reason = fmt::format("{} (t = {:.6g} s, step {})", e.what(), t, out.steps);
+        observer.snapshot(file, t, out.steps);
+    }
+    progress.clear();
+    out.solve_seconds = watch.seconds() - out.output_seconds;
+    return out;
+}
+
+void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
+{
+    file.attribute("/", "format", std::string("testbed-result"));
+    file.attribute("/", "format_version", std::int64_t{1});
+    file.attribute("/", "case", scene.case_name());
+    file.attribute("/", "title", scene.title);
+    file.attribute("/", "method", find_variant(scene.method).family);
+    file.attribute("/", "variant", variant_label(scene));
+    file.attribute("/", "kinematics", std::string(solver.kinematics()));
+    file.attribute("/scene", "resolved", resolved_toml(scene));
+    file.attribute("/scene", "cell_size", scene.grid.cell_size);
+    file.attribute("/scene", "cell_origin", std::span<const double>(scene.grid.origin));
+    file.attribute("/scene", "points_per_cell", std::int64_t{scene.bodies[0].points_per_cell});
+    file.attribute("/scene", "metrics", fmt::format("{}", fmt::join(scene.report.metrics, ",")));
+    std::string constants;
+    for (const auto& [name, value] : scene.constants)
+        constants += fmt::format("{} = {}\n", name, value);
+    file.attribute("/scene", "constants", constants);
+    file.attribute("/provenance", "commit", std::string(build().commit));
+    file.attribute("/provenance", "compiler", std::string(build().compiler));
+    file.attribute("/provenance", "flags", std::string(build().flags));
+    file.attribute("/provenance", "build_type", std::string(build().type));
+    file.attribute("/provenance", "cpu", cpu_name());
+    file.attribute("/provenance", "threads", std::int64_t{threads()});
+    file.attribute("/provenance", "load_average", load_average());
+    file.attribute("/provenance", "started", time_stamp());
+    for (const MaterialSpec& m : scene.materials)
+    {
+        const ElasticModuli moduli(largest_youngs_modulus(scene, m), m.poissons_ratio);
+        const std::string group = "/materials/" + m.name;
+        file.attribute(group, "law", m.law);
+        file.attribute(group, "density", m.density);
+        file.attribute(group, "youngs_modulus", moduli.youngs_modulus());
+        file.attribute(group, "poissons_ratio", moduli.poissons_ratio());
+        file.attribute(group, "constrained_modulus", moduli.constrained());
+    }
+}
+
+void write_performance(ResultFile& file, const Scene& scene, Solver& solver, const Outcome& out, double setup_seconds,
+                       std::size_t points)
+{
+    const std::string group = "/performance";
+    const double particle_steps = static_cast<double>(points) * static_cast<double>(out.steps);
+    file.attribute(group, "setup_s", setup_seconds);
+    file.attribute(group, "solve_s", out.solve_seconds);
+    file.attribute(group, "output_s", out.output_seconds);
+    file.attribute(group, "steps", out.steps);
+    file.attribute(group, "points", static_cast<std::int64_t>(points));
+    file.attribute(group, "particle_steps", particle_steps);
+    file.attribute(group, "particle_steps_per_second", particle_steps / out.solve_seconds);
+    file.attribute(group, "bytes_per_point", static_cast<double>(solver.bytes()) / static_cast<double>(points));
+    file.attribute(group, "cells", static_cast<std::int64_t>(solver.active_cells()));
+    file.attribute(group, "dofs", static_cast<std::int64_t>(solver.unknowns()));
+    file.attribute(group, "dt", out.dt);
+    file.attribute(group, "dt_critical", critical_time_step(scene));
+    for (const auto& [phase, seconds] : solver.timer().phases())
+        file.attribute(group + "/phases", phase, seconds);
+}
+}  // namespace
+
+Scene load_and_warn(const RunOptions& options)
+{
+    LoadedScene loaded = load_scene(options.scene, options.method, options.overrides);
+    if (options.strict && !loaded.warnings.empty())
+        throw SceneError(fmt::format("{}", fmt::join(loaded.warnings, "\n")));
+    for (const auto& w : loaded.warnings)
+        fmt::print(stderr, "warning: {}\n", w);
+    return std::move(loaded.scene);
+}
+
+int guarded_main(const std::function<int()>& body)
+{
+    const auto fail = [](ExitCode code, const char* message) {
+        fmt::print(stderr, "error: {}\n", message);
+        return static_cast<int>(code);
+    };
+    try
+    {
+        return body();
+    }
+    catch (const SceneError& e)
+    {
+        return fail(ExitCode::bad_scene, e.what());
+    }
+    catch (const std::bad_alloc&)
+    {
+        return fail(ExitCode::internal, "out of memory: make the lattice smaller or the cells larger");
+    }
+    catch (const std::exception& e)
+    {
+        return fail(ExitCode::internal, e.what());
+    }
+}
+
+std::string default_output(const Scene& scene)
+{
+    const std::string name = scene.case_name();
+    return (name.empty() ? "result" : name) + "_" + scene.method + ".h5";
+}
+
+ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
+{
+    const Stopwatch setup;
+    set_threads(options.threads);
+    const Scene scene = load_and_warn(options);
+    const std::unique_ptr<Solver> solver = make_solver(scene);
+    Observer observer(scene, *solver);
+    std::size_t points = 0;
+    for (const Body& body : solver->bodies())
+        points += body.points.count;
+    const double setup_seconds = setup.seconds();
+
+    catch_signals();
+    const std::string output = options.output.empty() ? default_output(scene) : options.output;
+    const auto open = [&] {
+        try
+        {
+            return ResultFile(output);
+        }
+        catch (const OutputError& e)
+        {
+            throw SceneError(e.what());  // nothing was computed yet: the user's to mend
+        }
+    };
+    ResultFile file = open();
+    write_header(file, scene, *solver);
+    const Outcome out = step_through(scene, *solver, observer, file, options.quiet);
+    observer.write_history(file);
+    write_performance(file, scene, *solver, out, setup_seconds, points);
+    file.attribute("/", "status", out.status);
+    file.attribute("/", "reason", out.reason);
+
+    file.commit();
+    const auto xdmf_path = std::filesystem::path(output).replace_extension(".xdmf");
+    std::ofstream xdmf(xdmf_path);
+    xdmf << observer.xdmf(std::filesystem::path(output).filename().string());
+    if (!xdmf.flush())
+        throw OutputError(fmt::format("cannot write '{}'", xdmf_path.string()));
+
+    if (!options.quiet)
+        fmt::print(stderr, "{} {}: {}{}{}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.0f} bytes per point; {}\n",
+                   scene.case_name(), variant_label(scene), out.status, out.reason.empty() ? "" : ": ", out.reason, points, out.steps, out.dt,
+                   out.solve_seconds, 1e-6 * static_cast<double>(points) * static_cast<double>(out.steps) / out.solve_seconds,
+                   static_cast<double>(solver->bytes()) / static_cast<double>(points), output);
+    else if (out.code != ExitCode::completed)
+        fmt::print(stderr, "{}: {}\n", out.status, out.reason);
+    return out.code;
+}
+}  // namespace testbed

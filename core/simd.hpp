@@ -1,0 +1,88 @@
+#pragma once
+/// Packs of points. A kernel is written once as a function of (offset, lanes) and is called for whole packs and for
+/// the rest of a bin, where lanes masks what lies behind its end. Fields are padded, so that loads may read over.
+
+#include <cstddef>
+#include <experimental/simd>
+
+namespace testbed
+{
+namespace stdx = std::experimental;
+using Pack = stdx::native_simd<double>;
+inline constexpr std::size_t pack_size = Pack::size();
+
+struct AllLanes
+{
+    static Pack load(const double* from) { return Pack(from, stdx::element_aligned); }
+    static void store(double* to, Pack v) { v.copy_to(to, stdx::element_aligned); }
+    static Pack keep(Pack v) { return v; }
+    static bool any(Pack::mask_type m) { return stdx::any_of(m); }
+};
+
+class SomeLanes
+{
+public:
+    explicit SomeLanes(std::size_t count)
+        : mask_(Pack([](auto i) { return static_cast<double>(i); }) < Pack(static_cast<double>(count)))
+    {
+    }
+    static Pack load(const double* from) { return Pack(from, stdx::element_aligned); }
+    void store(double* to, Pack v) const { stdx::where(mask_, v).copy_to(to, stdx::element_aligned); }
+    Pack keep(Pack v) const
+    {
+        stdx::where(!mask_, v) = Pack(0.0);
+        return v;
+    }
+    bool any(Pack::mask_type m) const { return stdx::any_of(m && mask_); }
+
+private:
+    Pack::mask_type mask_;
+};
+
+/// Calls kernel(offset, lanes) for the points [begin, end).
+template <class Kernel>
+void for_each_pack(std::size_t begin, std::size_t end, Kernel&& kernel)
+{
+    std::size_t p = begin;
+    for (; p + pack_size <= end; p += pack_size)
+        kernel(p, AllLanes{});
+    if (p < end)
+        kernel(p, SomeLanes(end - p));
+}
+
+inline double sum(Pack v)
+{
+    return stdx::reduce(v);
+}
+inline double sum(double v)
+{
+    return v;
+}
+inline Pack max(Pack a, Pack b)
+{
+    return stdx::max(a, b);
+}
+inline Pack min(Pack a, Pack b)
+{
+    return stdx::min(a, b);
+}
+inline double max(double a, double b)
+{
+    return a > b ? a : b;
+}
+inline double min(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+/// v where it is larger than the threshold, else zero.
+inline Pack above(Pack v, double threshold)
+{
+    stdx::where(v <= Pack(threshold), v) = Pack(0.0);
+    return v;
+}
+inline double above(double v, double threshold)
+{
+    return v > threshold ? v : 0.0;
+}
+}  // namespace testbed

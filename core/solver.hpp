@@ -1,0 +1,68 @@
+#pragma once
+/// What the run loop knows of a method: the one boundary of type erasure, crossed a few times per step.
+
+#include "core/body.hpp"
+#include "core/node_ops.hpp"
+#include "core/phase_timer.hpp"
+
+namespace testbed
+{
+/// Sums over the system at one time, per metre of thickness.
+struct MotionSums
+{
+    double kinetic_energy = 0;    ///< J/m
+    Vec2 momentum{0, 0};          ///< kg/s
+    double angular_momentum = 0;  ///< kg m/s, about the lattice origin
+    double unbalanced = 0;        ///< norm of the nodal forces out of balance over that of the internal ones
+};
+
+/// Sums over nodes whose velocity is `lag` seconds behind their forces. @param internal norm of the internal nodal forces
+inline MotionSums nodal_sums(const Lattice& lattice, const Nodes& nodes, double lag, double internal)
+{
+    const auto s = ordered_sum<4>(nodes.active.size(), [&](std::size_t a) {
+        const std::size_t i = nodes.active[a];
+        const Vec2 x = lattice.node_position(i);
+        const double m = nodes.mass[i], step = inverse_mass(nodes, i) * lag;
+        const double vx = nodes.vx[i] + nodes.fx[i] * step, vy = nodes.vy[i] + nodes.fy[i] * step;
+        return std::array<double, 4>{0.5 * m * (vx * vx + vy * vy), m * vx, m * vy,
+                                     m * ((x[0] - lattice.origin[0]) * vy - (x[1] - lattice.origin[1]) * vx)};
+    });
+    return {s[0], {s[1], s[2]}, s[3], internal > 0 ? force_norm(nodes) / internal : 0};
+}
+
+/// Bytes of the arrays of all points and of their order.
+inline std::size_t bytes_of(std::vector<Body>& bodies)
+{
+    std::size_t total = 0;
+    for (Body& body : bodies)
+    {
+        body.points.for_each_field([&](const auto& field) { total += field.bytes(); });
+        total += body.bins.bytes();
+    }
+    return total;
+}
+
+class Solver
+{
+public:
+    virtual ~Solver() = default;
+
+    /// Forces and accelerations at time t, from the state at t. dt is the coming step [s].
+    virtual void prepare(double t, double dt) = 0;
+    /// Sums at the time of the last prepare().
+    virtual MotionSums sums() const = 0;
+    /// The state from t to t + dt. @throws Diverged
+    virtual void advance(double dt) = 0;
+
+    virtual const std::vector<Body>& bodies() const = 0;
+    /// Velocity of a point, at the half step before the last prepare().
+    virtual Vec2 velocity(std::size_t body, std::size_t point) const = 0;
+    virtual std::size_t unknowns() const = 0;       ///< nodal unknowns that carry mass
+    virtual std::size_t active_cells() const = 0;
+    virtual std::size_t bytes() = 0;                ///< of all arrays
+    virtual const PhaseTimer& timer() const = 0;
+    virtual const char* kinematics() const = 0;     ///< which [exact.*] applies
+    /// One implicit step to the end instead of many explicit ones.
+    virtual bool is_static() const { return false; }
+};
+}  // namespace testbed

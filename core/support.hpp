@@ -1,0 +1,131 @@
+#pragma once
+/// The support of a point: which S x S cells or nodes it touches, and with which weights. In each direction the support begins
+/// at `a` = (corner - bin) / L in [0, 1); a point with a box has `width` = box / L <= 1, others have none.
+
+#include "core/body.hpp"
+#include "core/simd.hpp"
+
+namespace testbed
+{
+/// A point belongs to one cell.
+struct PointSupport
+{
+    static constexpr int S = 1;
+    static constexpr bool has_box = false;
+
+    template <class T>
+    static std::array<T, S> weights(T, T)
+    {
+        return {T(1.0)};
+    }
+};
+
+/// Share of a point's box in each of the two cells that it may overlap.
+struct DomainSupport
+{
+    static constexpr int S = 2;
+    static constexpr bool has_box = true;
+
+    template <class T>
+    static std::array<T, S> weights(T a, T width)
+    {
+        const T high = above(a + width - T(1.0), bin_tolerance) / width;
+        return {T(1.0) - high, high};
+    }
+};
+
+/// Where the supports of a pack of points begin in their bin, and how wide they are [cells].
+struct Corner
+{
+    Pack ax, ay, wx, wy;
+};
+
+/// Maps points to the coordinates of their bin.
+struct BinFrame
+{
+    double scale, x0, y0;  ///< 1/L; bin corner in cells from the coordinate origin
+
+    BinFrame(const Lattice& lattice, const Bin& bin)
+        : scale(1 / lattice.cell_size), x0(lattice.origin[0] * scale + bin.i), y0(lattice.origin[1] * scale + bin.j)
+    {
+    }
+
+    template <class Support, class Lanes>
+    Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    {
+        const Pack cx = x * Pack(scale) - Pack(x0), cy = y * Pack(scale) - Pack(y0);
+        if constexpr (!Support::has_box)
+            return {cx, cy, Pack(0.0), Pack(0.0)};
+        else
+        {
+            const Pack hx = min(lanes.load(&q.half_x[p]) * Pack(scale), Pack(0.5));
+            const Pack hy = min(lanes.load(&q.half_y[p]) * Pack(scale), Pack(0.5));
+            return {cx - hx, cy - hy, hx + hx, hy + hy};
+        }
+    }
+    template <class Support, class Lanes>
+    Corner corner(const Points& q, std::size_t p, const Lanes& lanes) const
+    {
+        return corner<Support>(q, p, lanes, lanes.load(&q.x[p]), lanes.load(&q.y[p]));
+    }
+    /// Whether the support of one of the points now begins in another bin.
+    template <class Support, class Lanes>
+    bool left(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    {
+        const Corner c = corner<Support>(q, p, lanes, x, y);
+        return lanes.any(left_bin(c.ax) || left_bin(c.ay));
+    }
+};
+
+/// Volume of a pack of points [m^2].
+template <class Support, class Lanes>
+Pack volume(const Points& q, std::size_t p, const Lanes& lanes)
+{
+    if constexpr (Support::has_box)
+        return Pack(4.0) * lanes.load(&q.half_x[p]) * lanes.load(&q.half_y[p]);
+    else
+        return lanes.load(&q.volume[p]);
+}
+
+/// Volume, or box, of a pack of points after the displacement gradient increment d.
+template <class Support, class Lanes>
+void stretch(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d)
+{
+    const Pack one(1.0);
+    if constexpr (Support::has_box)
+    {
+        lanes.store(&q.half_x[p], lanes.load(&q.half_x[p]) * (one + d.xx));
+        lanes.store(&q.half_y[p], lanes.load(&q.half_y[p]) * (one + d.yy));
+    }
+    else
+        lanes.store(&q.volume[p], lanes.load(&q.volume[p]) * (one + d.trace()));
+}
+
+/// Adds Q quantities of the points of each bin, weighted, to the bin's S x S blocks.
+/// @param quantities (p, lanes) -> array of Q packs @param partial S*S*Q numbers for each bin from `first_bin` on
+template <class Support, std::size_t Q, class Quantities>
+void spread(const Lattice& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial, Quantities&& quantities)
+{
+    constexpr int S = Support::S;
+    const auto& bins = body.bins.list();
+    parallel_for(bins.size(), [&](std::size_t b) {
+        std::array<Pack, S * S * Q> total{};
+        const BinFrame frame(lattice, bins[b]);
+        for_each_pack(bins[b].begin, bins[b].end, [&](std::size_t p, const auto& lanes) {
+            const Corner c = frame.corner<Support>(body.points, p, lanes);
+            const auto wx = Support::weights(c.ax, c.wx), wy = Support::weights(c.ay, c.wy);
+            const std::array<Pack, Q> value = quantities(p, lanes);
+            for (int j = 0; j < S; ++j)
+                for (int i = 0; i < S; ++i)
+                {
+                    const Pack w = lanes.keep(wx[i] * wy[j]);
+                    for (std::size_t k = 0; k < Q; ++k)
+                        total[(j * S + i) * Q + k] += w * value[k];
+                }
+        });
+        double* to = &partial[(first_bin + b) * S * S * Q];
+        for (std::size_t k = 0; k < total.size(); ++k)
+            to[k] = sum(total[k]);
+    });
+}
+}  // namespace testbed

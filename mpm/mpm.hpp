@@ -1,0 +1,12 @@
+#pragma once
+/// Material Point Method: velocity lives on the points and is mapped to the nodes anew in each step.
+
+#include "core/solver.hpp"
+
+#include <memory>
+
+namespace testbed
+{
+/// @throws SceneError
+std::unique_ptr<Solver> make_mpm(const Scene& scene);
+}  // namespace testbed

@@ -1,0 +1,48 @@
+#pragma once
+/// Nodal shape functions as a point sees them, in one direction: values at the S nodes from the bin's first on, and slopes
+/// per cell. `a` and `width` as in core/support.hpp.
+
+#include "core/support.hpp"
+
+namespace testbed
+{
+/// Bilinear, evaluated at the point (Sulsky, Chen & Schreyer 1994).
+struct LinearShape
+{
+    static constexpr int S = 2;
+    static constexpr bool has_box = false;
+
+    template <class T>
+    static std::array<T, S> weights(T a, T)
+    {
+        return {T(1.0) - a, a};
+    }
+    template <class T>
+    static std::array<T, S> slopes(T, T)
+    {
+        return {T(-1.0), T(1.0)};
+    }
+};
+
+/// Mean of the linear shape function and of its slope over the point's box (Bardenhagen & Kober 2004); the box stretches
+/// with the point, so that neighbours stay contiguous (cpGIMP).
+struct GimpShape
+{
+    static constexpr int S = 3;
+    static constexpr bool has_box = true;
+
+    template <class T>
+    static std::array<T, S> weights(T a, T width)
+    {
+        const T second = above(a + width - T(1.0), bin_tolerance), first = width - second;
+        const T low = first * (T(1.0) - a - T(0.5) * first) / width, high = T(0.5) * second * second / width;
+        return {low, T(1.0) - low - high, high};
+    }
+    template <class T>
+    static std::array<T, S> slopes(T a, T width)
+    {
+        const T second = above(a + width - T(1.0), bin_tolerance) / width, first = T(1.0) - second;
+        return {-first, first - second, second};
+    }
+};
+}  // namespace testbed

@@ -1,0 +1,202 @@
+#pragma once
+/// Particle-to-node and node-to-particle kernels of MPM. A bin's nodes are the same for all its points, so their values are
+/// loaded once and their sums are kept in registers.
+
+#include "core/kinematics.hpp"
+#include "core/support.hpp"
+#include "mpm/shape.hpp"
+
+namespace testbed
+{
+/// Values and gradients of the S x S shape functions at a pack of points; gradients in 1/m.
+template <class Shape>
+struct ShapeAt
+{
+    static constexpr int S = Shape::S;
+    std::array<Pack, S> wx, wy, gx, gy;
+
+    ShapeAt(const Corner& c, double scale)
+        : wx(Shape::weights(c.ax, c.wx)), wy(Shape::weights(c.ay, c.wy)), gx(Shape::slopes(c.ax, c.wx)), gy(Shape::slopes(c.ay, c.wy))
+    {
+        for (int k = 0; k < S; ++k)
+        {
+            gx[k] *= Pack(scale);
+            gy[k] *= Pack(scale);
+        }
+    }
+    Pack value(int i, int j) const { return wx[i] * wy[j]; }
+    Pack slope_x(int i, int j) const { return gx[i] * wy[j]; }
+    Pack slope_y(int i, int j) const { return wx[i] * gy[j]; }
+};
+
+/// Strain at each point ("four-point").
+struct PointStrain
+{
+    static constexpr bool averaged = false;
+    template <class Shape>
+    struct InBin
+    {
+        InBin(const Lattice&, const Points&, const Bin&) {}
+    };
+};
+
+/// Volumetric strain averaged over the cell (B-bar): the slopes that make the in-plane dilatation are those at the centroid of
+/// the cell's points, which is their volume-weighted mean since they are linear. The deviatoric part stays pointwise.
+struct BBarStrain
+{
+    static constexpr bool averaged = true;
+    template <class Shape>
+    struct InBin
+    {
+        std::array<Pack, 4> mean_x, mean_y;
+
+        InBin(const Lattice& lattice, const Points& q, const Bin& bin)
+        {
+            static_assert(std::is_same_v<Shape, LinearShape>);
+            const BinFrame frame(lattice, bin);
+            Pack total(0.0), ax(0.0), ay(0.0);
+            for_each_pack(bin.begin, bin.end, [&](std::size_t p, const auto& lanes) {
+                const Corner c = frame.corner<Shape>(q, p, lanes);
+                const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
+                total += v;
+                ax += v * lanes.keep(c.ax);
+                ay += v * lanes.keep(c.ay);
+            });
+            const double all = sum(total);
+            const ShapeAt<Shape> at({Pack(sum(ax) / all), Pack(sum(ay) / all), Pack(0.0), Pack(0.0)}, frame.scale);
+            for (int k = 0; k < 4; ++k)
+            {
+                mean_x[k] = at.slope_x(k % 2, k / 2);
+                mean_y[k] = at.slope_y(k % 2, k / 2);
+            }
+        }
+    };
+};
+
+/// What scatter() sums at each node.
+enum class Scatter
+{
+    momentum,           ///< mass, momentum
+    force,              ///< internal force
+    momentum_and_force  ///< both
+};
+template <Scatter what>
+inline constexpr std::size_t sums_of = what == Scatter::momentum_and_force ? 5 : what == Scatter::momentum ? 3 : 2;
+
+/// m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V sigma . grad N_i, to the blocks of each bin.
+/// With B-bar the mean in-plane stress works on the cell's dilatation: dual to the strain of gather_strain().
+template <class Shape, class Strain, Scatter what>
+void scatter(const Lattice& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial)
+{
+    constexpr int S = Shape::S;
+    constexpr std::size_t Q = sums_of<what>;
+    const auto& bins = body.bins.list();
+    const Points& q = body.points;
+    parallel_for(bins.size(), [&](std::size_t b) {
+        const BinFrame frame(lattice, bins[b]);
+        const typename Strain::template InBin<Shape> strain(lattice, q, bins[b]);
+        std::array<Pack, S * S * Q> total{};
+        for_each_pack(bins[b].begin, bins[b].end, [&](std::size_t p, const auto& lanes) {
+            const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
+            [[maybe_unused]] Pack m, px, py, txx, tyy, txy, mean;
+            if constexpr (what != Scatter::force)
+            {
+                m = lanes.keep(Pack(q.mass));
+                px = m * lanes.load(&q.vx[p]);
+                py = m * lanes.load(&q.vy[p]);
+            }
+            if constexpr (what != Scatter::momentum)
+            {
+                const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
+                txx = v * lanes.load(&q.sxx[p]);
+                tyy = v * lanes.load(&q.syy[p]);
+                txy = v * lanes.load(&q.sxy[p]);
+                mean = Pack(0.5) * (txx + tyy);
+            }
+            for (int j = 0; j < S; ++j)
+                for (int i = 0; i < S; ++i)
+                {
+                    Pack* to = &total[static_cast<std::size_t>(j * S + i) * Q];
+                    if constexpr (what != Scatter::force)
+                    {
+                        const Pack N = at.value(i, j);
+                        to[0] += m * N;
+                        to[1] += px * N;
+                        to[2] += py * N;
+                    }
+                    if constexpr (what != Scatter::momentum)
+                    {
+                        const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
+                        to[Q - 2] -= txx * nx + txy * ny;
+                        to[Q - 1] -= txy * nx + tyy * ny;
+                        if constexpr (Strain::averaged)
+                        {
+                            to[Q - 2] -= mean * (strain.mean_x[j * S + i] - nx);
+                            to[Q - 1] -= mean * (strain.mean_y[j * S + i] - ny);
+                        }
+                    }
+                }
+        });
+        double* to = &partial[(first_bin + b) * S * S * Q];
+        for (std::size_t k = 0; k < total.size(); ++k)
+            to[k] = sum(total[k]);
+    });
+}
+
+/// Nodal values of one bin.
+template <int S>
+struct NodalVelocity
+{
+    std::array<double, static_cast<std::size_t>(S* S)> x, y;
+
+    NodalVelocity(const Lattice& lattice, const Bin& bin, const std::vector<double>& vx, const std::vector<double>& vy)
+    {
+        for (int j = 0; j < S; ++j)
+            for (int i = 0; i < S; ++i)
+            {
+                const std::size_t n = lattice.node(bin.i + i, bin.j + j);
+                x[j * S + i] = vx[n];
+                y[j * S + i] = vy[n];
+            }
+    }
+    template <class At>
+    std::array<Pack, 2> at(const At& at) const
+    {
+        Pack vx(0.0), vy(0.0);
+        for (int j = 0; j < S; ++j)
+            for (int i = 0; i < S; ++i)
+            {
+                const Pack N = at.value(i, j);
+                vx += N * Pack(x[j * S + i]);
+                vy += N * Pack(y[j * S + i]);
+            }
+        return {vx, vy};
+    }
+    /// Gradient of the increment over dt, with the dilatation that `strain` prescribes.
+    template <class Strain, class At, class InBin>
+    Gradient<Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
+    {
+        Gradient<Pack> d{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
+        [[maybe_unused]] Pack dilatation(0.0);
+        for (int j = 0; j < S; ++j)
+            for (int i = 0; i < S; ++i)
+            {
+                const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
+                const Pack vx(x[j * S + i] * dt), vy(y[j * S + i] * dt);
+                d.xx += nx * vx;
+                d.yy += ny * vy;
+                d.xy += ny * vx;
+                d.yx += nx * vy;
+                if constexpr (Strain::averaged)
+                    dilatation += strain.mean_x[j * S + i] * vx + strain.mean_y[j * S + i] * vy;
+            }
+        if constexpr (Strain::averaged)
+        {
+            const Pack correction = Pack(0.5) * (dilatation - d.trace());
+            d.xx += correction;
+            d.yy += correction;
+        }
+        return d;
+    }
+};
+}  // namespace testbed

@@ -1,0 +1,1 @@
+"""Studies, metrics, figures and reports of the testbed; solvers are met only in result files."""

@@ -1,0 +1,136 @@
+"""A study's folder in memory: its runs, their results and their rows of metrics."""
+import csv
+import io
+import json
+import math
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from . import metrics
+from .results import Result, ResultError
+from .study_file import StudyError, matches, read_study
+
+CSV_COLUMNS = ("run_id", "case", "method", "variant", "L", "ppc", "dt", "seed", "quantity", "norm", "value",
+               "solve_s", "particle_steps", "status")
+PLAN = "plan.json"
+
+
+@dataclass
+class Run:
+    """One run of a study. `values` holds what a `where` may ask for; `result` is None when there is no usable file."""
+    id: str
+    folder: Path
+    values: dict
+    status: str
+    reason: str = ""
+    result: Result | None = None
+    rows: dict = field(default_factory=dict)
+    errors: list = field(default_factory=list)
+
+    @property
+    def completed(self):
+        return self.status == "completed"
+
+    @property
+    def name(self):
+        return self.values.get("variant") or self.id
+
+    def value(self, quantity, norm=""):
+        """The metric, nan when the run has none."""
+        return self.rows.get((quantity, norm), math.nan)
+
+
+@dataclass
+class Study:
+    """A study's folder: the study file, the runs of its present plan, and the combinations left out."""
+    folder: Path
+    spec: object
+    plan: dict
+    runs: list
+    left_out: list
+
+    @property
+    def name(self):
+        return self.folder.name
+
+    def select(self, where):
+        return [run for run in self.runs if matches(run.values, where)]
+
+    def variants(self):
+        return list(dict.fromkeys(run.name for run in self.runs))
+
+
+def write_atomically(path, text):
+    """Writes a whole file or none."""
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, path)
+
+
+def read_run(folder, entry):
+    """A run from its folder; never raises for a bad file, but says so in `reason`."""
+    folder = Path(folder)
+    values = {**entry.get("axes", {}), "repeat": entry.get("repeat", 1)}
+    for key in ("method", "variant", "L", "ppc", "seed"):
+        if entry.get(key) not in (None, ""):
+            values[key] = entry[key]
+    run = Run(entry["id"], folder, values, "missing", entry.get("outcome", "") or "not run yet")
+    path = folder / "result.h5"
+    if not path.is_file():
+        return run
+    try:
+        result = Result(path)
+        values.update(method=result.method, variant=result.variant, L=result.cell_size,
+                      ppc=result.scene.get("points_per_cell", ""), dt=result.performance.get("dt", ""),
+                      seed=result.seed)
+    except ResultError as error:
+        run.status, run.reason = "unreadable", str(error).replace(str(folder) + os.sep, "")
+        return run
+    run.result, run.status, run.reason = result, result.status, result.reason
+    grades = metrics.grade(result)
+    run.rows, run.errors = grades.rows, grades.errors
+    return run
+
+
+def read_plan(folder):
+    """plan.json of a study's folder; without one, every folder under runs/."""
+    path = Path(folder) / PLAN
+    if path.is_file():
+        try:
+            return json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise StudyError(f"{path}: cannot be read: {error}") from error
+    runs = sorted(p.name for p in (Path(folder) / "runs").glob("*") if p.is_dir())
+    return {"runs": [{"id": name} for name in runs], "left_out": []}
+
+
+def read_study_folder(folder):
+    """A study's folder, graded. Raises StudyError when the study file or the plan is unusable."""
+    folder = Path(folder)
+    spec, plan = read_study(folder / "study.toml", need_scene=False), read_plan(folder)
+    runs = [read_run(folder / "runs" / entry["id"], entry) for entry in plan.get("runs", [])]
+    return Study(folder, spec, plan, runs, plan.get("left_out", []))
+
+
+def _number(value):
+    return repr(float(value)) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+
+
+def metrics_csv(runs):
+    """metrics.csv of the runs that have a finished result, as text."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(CSV_COLUMNS)
+    for run in runs:
+        if run.result is None or not run.result.finished:
+            continue
+        performance = run.result.performance
+        for (quantity, norm), value in run.rows.items():
+            writer.writerow([run.id, run.result.case, run.result.method, run.result.variant,
+                             _number(run.values["L"]), run.values["ppc"], _number(run.values["dt"]),
+                             run.values["seed"], quantity, norm, repr(float(value)),
+                             _number(performance.get("solve_s", "")), performance.get("particle_steps", ""),
+                             run.status])
+    return out.getvalue()

@@ -1,0 +1,181 @@
+"""`testbed report`: one page, figures for print, tables for print, from the folders of studies."""
+import argparse
+import os
+import re
+import shlex
+import sys
+from collections import Counter
+from datetime import datetime, timezone
+from pathlib import Path
+
+from .dataset import read_study_folder, write_atomically
+from .figures import FigureError, draw, label_of
+from .page import inline_svg, render
+from .results import ResultError
+from .study_file import StudyError
+from .style import RC, Style, plt
+from .tables import Table, as_csv, as_latex, study_tables, targets_table
+from .targets import judge_all
+
+
+def find_studies(folders):
+    """Folders of studies: those given, or those inside a given one."""
+    found = []
+    for folder in map(Path, folders):
+        if not folder.is_dir():
+            raise StudyError(f"{folder}: no such folder")
+        if (folder / "study.toml").is_file():
+            inside = [folder]
+        else:
+            inside = sorted(p.parent for p in folder.glob("*/study.toml"))
+        if not inside:
+            raise StudyError(f"{folder}: holds no study (no study.toml)")
+        found += inside
+    return list(dict.fromkeys(p.resolve() for p in found))
+
+
+def slug(text):
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+
+
+def _unique(values):
+    return [str(v) for v in dict.fromkeys(values) if v not in (None, "")]
+
+
+def provenance(studies, command):
+    """[(name, values)] over all results, and warnings about mixtures."""
+    sources = [run.result.provenance for s in studies for run in s.runs if run.result is not None]
+    rows, warnings = [], []
+    for key, name in (("commit", "Commit"), ("compiler", "Compiler"), ("flags", "Flags"), ("build_type", "Build"),
+                      ("cpu", "Processor"), ("threads", "Threads")):
+        values = _unique(p.get(key) for p in sources)
+        if values:
+            rows.append((name, values))
+        if len(values) > 1 and key in ("commit", "flags", "build_type", "cpu"):
+            warnings.append(f"The runs come from different builds or machines: {name.lower()} {' and '.join(values)}.")
+    started = sorted(_unique(p.get("started") for p in sources))
+    if started:
+        rows.append(("Runs started", [started[0]] if len(started) == 1 else [f"{started[0]} to {started[-1]}"]))
+    rows.append(("Page made", [datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")]))
+    rows.append(("Made by", _unique([s.plan.get("command") for s in studies] + [command])))
+    return rows, warnings
+
+
+def caption(study, entry, drawing, command):
+    """What is seen, then the runs, the commit and the command."""
+    sentences = [entry.get("caption", "").strip().rstrip(".")] + [n.rstrip(".") for n in drawing.notes]
+    sizes = sorted({r.values["L"] for r in drawing.runs if isinstance(r.values.get("L"), (int, float))}, reverse=True)
+    sentences.append(f"Runs: study {study.name}" + (f", L = {', '.join(f'{s:g}' for s in sizes)} m" if sizes else ""))
+    ratios = [r.value("static", "kinetic_over_strain") for r in drawing.runs]
+    ratios = [r for r in ratios if r == r]
+    if ratios:
+        sentences.append(f"Kinetic/strain energy at the end at most {max(ratios):.2e}")
+    commits = _unique(r.result.provenance.get("commit") for r in drawing.runs if r.result is not None)
+    if commits:
+        sentences.append(f"Commit {', '.join(commits)}")
+    remade = "; ".join(filter(None, (study.plan.get("command"), command)))
+    return ". ".join(filter(None, sentences)) + f". Made by: {remade}"
+
+
+def _figure_labels(studies):
+    labels = []
+    for study in studies:
+        labels += study.variants()
+        labels += [e.get("variant") for e in study.left_out]
+        for entry in study.spec.figures:
+            if entry["series"] != ["variant"]:
+                labels += [label_of(run, entry) for run in study.select(entry["where"])]
+    return [label for label in labels if label]
+
+
+def _study_section(study, style, out, command, failures):
+    figures, used = [], Counter()
+    for entry in study.spec.figures:
+        what = entry.get("quantity") or entry.get("component", "")
+        name = slug(entry.get("name") or "_".join(filter(None, (entry["kind"], what, entry.get("norm", "")))))
+        used[name] += 1
+        name = f"{slug(study.name)}_{name}" + (f"_{used[name]}" if used[name] > 1 else "")
+        title = entry.get("title") or f"{entry['kind']}: {what} {entry.get('norm', '')}".replace("_", " ").strip()
+        title = title[:1].upper() + title[1:]
+        shown = {"title": title, "image": "", "caption": "", "error": "", "width": "column"}
+        try:
+            with plt.rc_context(RC):
+                drawing = draw(study, entry, style)
+                drawing.figure.savefig(out / "figures" / f"{name}.pdf", dpi=300,
+                                       metadata={"CreationDate": None, "Creator": None, "Producer": None})
+                shown["image"] = inline_svg(drawing.figure)
+                shown["width"] = "page" if drawing.figure.get_figwidth() > 5 else "column"
+                shown["caption"] = caption(study, entry, drawing, command)
+        except (FigureError, ResultError) as error:
+            shown["error"] = str(error)
+            failures.append([study.name, f"figure {name}", "not drawn", str(error)])
+        finally:
+            plt.close("all")
+        figures.append(shown)
+    tables = study_tables(study)
+    counts = Counter(run.status for run in study.runs)
+    summary = f"{len(study.runs)} runs: " + ", ".join(f"{n} {status}" for status, n in counts.items()) + "."
+    if study.left_out:
+        summary += f" {len(study.left_out)} combinations left out."
+    return {"anchor": f"study-{slug(study.name)}", "title": study.spec.title, "purpose": study.spec.purpose,
+            "summary": summary, "figures": figures, "tables": tables}
+
+
+def build(folders, out, command):
+    """Writes the report of studies into the folder `out`; returns the path of the page."""
+    out = Path(out)
+    studies, failures = [], []
+    for folder in find_studies(folders):
+        try:
+            studies.append(read_study_folder(folder))
+        except StudyError as error:
+            failures.append([folder.name, "the whole study", "unreadable",
+                             str(error).replace(str(folder) + os.sep, "")])
+    for name in ("figures", "tables"):
+        (out / name).mkdir(parents=True, exist_ok=True)
+    for study in studies:
+        for run in study.runs:
+            if not run.completed:
+                failures.append([study.name, run.id, run.status, run.reason])
+            failures += [[study.name, run.id, "number missing", error] for error in run.errors]
+    style = Style(_figure_labels(studies))
+    verdicts = [(study, judge_all(study)) for study in studies]
+    sections = [_study_section(study, style, out, command, failures) for study in studies]
+    for (study, judged), section in zip(verdicts, sections):
+        for table in section["tables"] + ([targets_table(judged)] if judged else []):
+            base = out / "tables" / f"{slug(study.name)}_{slug(table.name)}"
+            write_atomically(base.with_suffix(".csv"), as_csv(table))
+            write_atomically(base.with_suffix(".tex"), as_latex(table))
+    rows, warnings = provenance(studies, command)
+    flat = [(study.name, v) for study, judged in verdicts for v in judged]
+    counted = Counter(v.verdict for _, v in flat)
+    left_out = [[s.name, e.get("variant") or "", ", ".join(f"{k} = {v}" for k, v in e.get("axes", {}).items()),
+                 e.get("reason", "")] for s in studies for e in s.left_out]
+    titles = [s.spec.title for s in studies]
+    page = render(title=titles[0] if len(titles) == 1 else "Testbed report", provenance=rows, warnings=warnings,
+                  studies=sections, verdicts=flat,
+                  counts=", ".join(f"{counted[k]} {k}" for k in ("pass", "fail", "not run") if counted[k]) + ".",
+                  failures=Table("failures", "Failures", ["study", "what", "status", "reason"], failures, 4),
+                  left_out=Table("left_out", "Left out", ["study", "variant", "combination", "reason"], left_out, 4))
+    write_atomically(out / "report.html", page)
+    return out / "report.html"
+
+
+def main(arguments=None):
+    """Entry of `testbed report`; returns the exit code."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    parser = argparse.ArgumentParser(prog="testbed report", description="Page, figures and tables of studies.")
+    parser.add_argument("folders", nargs="+", metavar="DIR", help="a study's folder, or a folder of such")
+    parser.add_argument("-o", "--output", metavar="OUT", help="default: 'report' beside the first DIR")
+    try:
+        options = parser.parse_args(arguments)
+    except SystemExit as stop:
+        return 1 if stop.code else 0
+    out = Path(options.output) if options.output else Path(options.folders[0]).resolve().parent / "report"
+    try:
+        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]))
+    except StudyError as error:
+        print(f"testbed report: {error}", file=sys.stderr)
+        return 1
+    print(os.path.relpath(page))
+    return 0

@@ -1,0 +1,197 @@
+"""Reading one result file (docs/file_formats.md), checked, with errors that name the file and what it lacks."""
+import tomllib
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+FINISHED = ("completed", "diverged", "time_limit")
+STATUSES = FINISHED + ("interrupted",)
+FORMAT, VERSION = "testbed-result", 1
+
+# Columns of a symmetric tensor in a file: the order of XDMF's Tensor6.
+TENSOR = {"xx": 0, "xy": 1, "xz": 2, "yy": 3, "yz": 4, "zz": 5}
+VECTOR = {"x": 0, "y": 1, "z": 2}
+
+
+class ResultError(Exception):
+    """A result file that cannot be read, or lacks something that was asked of it."""
+
+
+def _plain(value):
+    """An HDF5 attribute as a plain Python value."""
+    if isinstance(value, bytes):
+        return value.decode()
+    if isinstance(value, np.ndarray):
+        return [_plain(v) for v in value.ravel()] if value.size != 1 else _plain(value.ravel()[0])
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _attributes(node):
+    return {key: _plain(value) for key, value in node.attrs.items()}
+
+
+class Snapshot:
+    """One snapshot: `time` [s], `step`, and its fields as arrays whose row n is material point n."""
+
+    def __init__(self, result, name, attributes, fields):
+        self.result, self.name, self.fields = result, name, fields
+        self.time, self.step = attributes.get("time"), attributes.get("step")
+        self._cache = {}
+
+    def __contains__(self, field):
+        return field in self.fields
+
+    def __getitem__(self, field):
+        """The field as a float array: (N,), (N, 3) or (N, 6)."""
+        if field not in self._cache:
+            self._cache[field] = self.result.dataset(f"snapshots/{self.name}/{field}")
+        return self._cache[field]
+
+    def unit(self, field):
+        return self.result.unit(f"snapshots/{self.name}/{field}")
+
+
+class Result:
+    """One result file. Attributes are read at once, arrays when asked for.
+
+    `root`, `scene`, `provenance`, `performance`: attributes as dictionaries; `phases`: seconds by phase name;
+    `materials`: attributes by material name; `resolved`: the resolved scene, parsed; `snapshots`: by rising number.
+    """
+
+    def __init__(self, path):
+        self.path = Path(path)
+        try:
+            with h5py.File(self.path, "r") as file:
+                self.root = _attributes(file)
+                if self.root.get("format") != FORMAT:
+                    raise ResultError(f"{self.path}: not a testbed result (attribute 'format')")
+                if self.root.get("format_version") != VERSION:
+                    raise ResultError(f"{self.path}: format_version {self.root.get('format_version')}, "
+                                      f"this program reads {VERSION}")
+                for name in ("case", "method", "variant", "status"):
+                    if name not in self.root:
+                        raise ResultError(f"{self.path}: lacks the attribute '{name}'")
+                if self.root["status"] not in STATUSES:
+                    raise ResultError(f"{self.path}: unknown status '{self.root['status']}'")
+                for name in ("scene", "performance"):
+                    if name not in file:
+                        raise ResultError(f"{self.path}: lacks the group '/{name}'")
+                self.scene = _attributes(file["scene"])
+                self.performance = _attributes(file["performance"])
+                self.provenance = _attributes(file["provenance"]) if "provenance" in file else {}
+                self.phases = _attributes(file["performance/phases"]) if "performance/phases" in file else {}
+                self.materials = {name: _attributes(node) for name, node in file.get("materials", {}).items()}
+                self.probes = sorted(file["history/probes"]) if "history/probes" in file else []
+                self.histories = [name for name, node in file.get("history", {}).items()
+                                  if isinstance(node, h5py.Dataset)]
+                self.snapshots = [Snapshot(self, name, _attributes(node), set(node))
+                                  for name, node in sorted(file.get("snapshots", {}).items())]
+        except ResultError:
+            raise
+        except Exception as error:  # h5py raises many kinds for a damaged file
+            raise ResultError(f"{self.path}: cannot be read: {error}") from error
+        try:
+            self.resolved = tomllib.loads(self.scene.get("resolved", ""))
+        except tomllib.TOMLDecodeError as error:
+            raise ResultError(f"{self.path}: the resolved scene is not TOML: {error}") from error
+
+    # What a run is called in tables.
+    case = property(lambda self: self.root["case"])
+    method = property(lambda self: self.root["method"])
+    variant = property(lambda self: self.root["variant"])
+    status = property(lambda self: self.root["status"])
+    reason = property(lambda self: self.root.get("reason", ""))
+
+    @property
+    def finished(self):
+        return self.status in FINISHED
+
+    @property
+    def cell_size(self):
+        """Cell size L [m]."""
+        if "cell_size" not in self.scene:
+            raise ResultError(f"{self.path}: lacks the attribute 'cell_size' of /scene")
+        return float(self.scene["cell_size"])
+
+    @property
+    def metrics(self):
+        """Metric groups that the scene asks for."""
+        return [name.strip() for name in str(self.scene.get("metrics", "")).split(",") if name.strip()]
+
+    @property
+    def reference(self):
+        """Named numbers of the scene's [report.reference], SI units."""
+        table = self.resolved.get("report", {}).get("reference", {})
+        numbers = {}
+        for key, value in table.items():
+            try:
+                numbers[key] = float(value)
+            except (TypeError, ValueError):
+                raise ResultError(f"{self.path}: report.reference.{key} is not a number: {value!r}") from None
+        return numbers
+
+    @property
+    def seed(self):
+        """The scene's random seed, '' when it has none."""
+        return _find(self.resolved, "seed")
+
+    def dataset(self, name):
+        """A dataset as a float array."""
+        try:
+            with h5py.File(self.path, "r") as file:
+                if name not in file:
+                    raise ResultError(f"{self.path}: lacks /{name}")
+                return np.asarray(file[name][()], dtype=float)
+        except ResultError:
+            raise
+        except Exception as error:
+            raise ResultError(f"{self.path}: /{name} cannot be read: {error}") from error
+
+    def unit(self, name):
+        """The unit of a dataset, '' when it is not given."""
+        try:
+            with h5py.File(self.path, "r") as file:
+                return str(_plain(file[name].attrs.get("unit", ""))) if name in file else ""
+        except Exception as error:
+            raise ResultError(f"{self.path}: /{name} cannot be read: {error}") from error
+
+    def history(self, name):
+        """A global history: (M,) or (M, 3)."""
+        return self.dataset(f"history/{name}")
+
+    def probe(self, probe, name):
+        """A history of a probe: (M, 3) or (M, 6)."""
+        return self.dataset(f"history/probes/{probe}/{name}")
+
+    def has(self, name):
+        with h5py.File(self.path, "r") as file:
+            return name in file
+
+    @property
+    def final(self):
+        if not self.snapshots:
+            raise ResultError(f"{self.path}: lacks snapshots")
+        return self.snapshots[-1]
+
+
+def _find(table, key):
+    """The first value of `key` anywhere in nested tables, '' when absent."""
+    if isinstance(table, dict):
+        if key in table and not isinstance(table[key], (dict, list)):
+            return table[key]
+        table = table.values()
+    if isinstance(table, (list, type({}.values()))):
+        for value in table:
+            found = _find(value, key)
+            if found != "":
+                return found
+    return ""
+
+
+def is_finished(path):
+    """Whether a readable file with its final name and a finished status is there."""
+    try:
+        return Path(path).is_file() and Result(path).finished
+    except ResultError:
+        return False

@@ -1,0 +1,303 @@
+"""The study file: strict reading of its keys, and the expansion of its axes into combinations."""
+import itertools
+import json
+import math
+import re
+import tomllib
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .spelling import did_you_mean
+
+NUMBER, TEXT, LIST, TABLE, FLAG = (int, float), (str,), (list,), (dict,), (bool,)
+TYPE_NAMES = {NUMBER: "a number", TEXT: "a string", LIST: "a list", TABLE: "a table", FLAG: "true or false",
+              (int,): "a whole number", TEXT + LIST: "a string or a list of strings",
+              NUMBER + LIST: "a number or a list of numbers", TEXT + NUMBER: "a string or a number"}
+
+STUDY_KEYS = {"title": TEXT, "purpose": TEXT, "scene": TEXT, "repeats": (int,), "threads": (int,), "set": TABLE,
+              "axes": TABLE, "exclude": LIST, "override": LIST, "target": LIST, "figure": LIST}
+
+# What a `where` may choose runs by, besides the axes of the study.
+COLUMNS = ("method", "variant", "L", "ppc", "dt", "seed", "repeat")
+
+TARGET_KEYS = {"label": TEXT, "quantity": TEXT, "norm": TEXT, "where": TABLE, "kind": TEXT, "value": NUMBER,
+               "low": NUMBER, "high": NUMBER, "L_from": NUMBER, "L_to": NUMBER, "source": TEXT}
+# kind -> keys that it needs
+TARGET_KINDS = {"value_max": ("value",), "value_min": ("value",), "value_between": ("low", "high"),
+                "order_min": ("value",), "order_between": ("low", "high"), "not_converging": ()}
+
+FIGURE_KEYS = {"kind": TEXT, "name": TEXT, "title": TEXT, "caption": TEXT, "where": TABLE, "width": TEXT,
+               "series": TEXT + LIST}
+# kind -> (keys that it needs, further keys)
+FIGURE_KINDS = {
+    "convergence": ({"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "orders": LIST, "L_from": NUMBER, "L_to": NUMBER}),
+    "work_precision": ({"quantity": TEXT}, {"norm": TEXT}),
+    "profile": ({"component": TEXT}, {"along": TEXT, "panels": TEXT, "L": NUMBER + LIST, "band": LIST,
+                                      "snapshot": (int,)}),
+    "field": ({"component": TEXT}, {"L": NUMBER, "range": LIST, "error": FLAG, "columns": (int,), "snapshot": (int,)}),
+    "history": ({"quantity": TEXT}, {"probe": TEXT, "L": NUMBER + LIST, "scale_x": TEXT + NUMBER,
+                                     "scale_y": TEXT + NUMBER, "log": FLAG, "t_max": NUMBER}),
+    "bars": ({"quantity": TEXT}, {"norm": TEXT, "L": NUMBER, "log": FLAG}),
+}
+WIDTHS = ("column", "page")
+
+
+class StudyError(Exception):
+    """A study file that cannot be used; the message names the file, the line and the key."""
+
+
+@dataclass
+class Combination:
+    """One member of the product of the axes: what it sets, before repeats."""
+    axes: dict
+    sets: dict
+    method: str | None
+    threads: int
+
+
+@dataclass
+class StudyFile:
+    """A checked study file."""
+    path: Path
+    title: str
+    purpose: str
+    scene: Path
+    repeats: int
+    combinations: list
+    targets: list = field(default_factory=list)
+    figures: list = field(default_factory=list)
+
+    @property
+    def name(self):
+        return self.path.stem
+
+
+_HEADER = re.compile(r"^\s*\[\[?\s*([\w.\"' -]+?)\s*\]\]?\s*(#.*)?$")
+_KEY = re.compile(r"^\s*([\w.\"'-]+?)\s*=")
+
+
+def line_of(text, key, table="", index=0):
+    """Line (from 1) on which `key` is set in the index-th `table`, None when it is not found."""
+    current, seen = "", Counter()
+    for number, line in enumerate(text.splitlines(), 1):
+        header = _HEADER.match(line)
+        if header:
+            current = header.group(1)
+            seen[current] += 1
+            if not table and current.strip("\"'") == key:
+                return number
+            continue
+        match = _KEY.match(line)
+        if match and match.group(1).strip("\"'") == key and current == table and max(seen[current] - 1, 0) == index:
+            return number
+    inline = re.compile(r"(^|[{,\s])[\"']?" + re.escape(key) + r"[\"']?\s*=")
+    for number, line in enumerate(text.splitlines(), 1):
+        if inline.search(line):
+            return number
+    return None
+
+
+def flatten(table, prefix=""):
+    """Nested tables as one with dotted keys: `time.cfl = 1` and `"time.cfl" = 1` mean the same."""
+    flat = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            flat.update(flatten(value, f"{prefix}{key}."))
+        else:
+            flat[prefix + key] = value
+    return flat
+
+
+def toml_value(value):
+    """A value in TOML syntax, for `--set key=value`."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value) if math.isfinite(value) else str(value)
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list):
+        return "[" + ", ".join(toml_value(v) for v in value) + "]"
+    raise ValueError(f"a value of type {type(value).__name__} cannot be set")
+
+
+def same(a, b):
+    """Equality of values; numbers to relative 1e-9."""
+    numbers = isinstance(a, NUMBER) and isinstance(b, NUMBER) and not isinstance(a, bool) and not isinstance(b, bool)
+    return math.isclose(a, b, rel_tol=1e-9) if numbers else a == b
+
+
+def matches(values, where):
+    """Whether `values` satisfies every key of `where`; a list means any of its members."""
+    for key, wanted in where.items():
+        options = wanted if isinstance(wanted, list) and not isinstance(values.get(key), list) else [wanted]
+        has = [values.get(key)] + ([values.get("variant")] if key == "method" else [])
+        if not any(same(h, o) for h in has for o in options):
+            return False
+    return True
+
+
+class _Reader:
+    """Checks one file, with messages that carry the line."""
+
+    def __init__(self, path):
+        self.path = Path(path)
+        try:
+            self.text = self.path.read_text(encoding="utf-8")
+            self.data = tomllib.loads(self.text)
+        except (OSError, UnicodeDecodeError) as error:
+            raise StudyError(f"{path}: cannot be read: {error}") from error
+        except tomllib.TOMLDecodeError as error:
+            raise StudyError(f"{path}: {error}") from error
+
+    def fail(self, message, key, table="", index=0):
+        line = line_of(self.text, key, table, index)
+        where = f"{self.path}:{line}" if line else f"{self.path}"
+        raise StudyError(f"{where}: {message}")
+
+    def check(self, data, keys, table="", index=0):
+        """Only known keys, of the right type."""
+        place = f" in [[{table}]] number {index + 1}" if table else ""
+        for key, value in data.items():
+            if key not in keys:
+                self.fail(f"unknown key '{key}'{place}{did_you_mean(key, keys)}", key, table, index)
+            types = keys[key]
+            if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
+                self.fail(f"'{key}'{place} must be {TYPE_NAMES.get(types, 'of another type')}, not {value!r}",
+                          key, table, index)
+
+    def need(self, data, keys, table, index, what):
+        for key in keys:
+            if key not in data:
+                self.fail(f"{what} in [[{table}]] number {index + 1} lacks the key '{key}'", "kind", table, index)
+
+    def choice(self, value, known, key, table, index):
+        if value not in known:
+            self.fail(f"unknown {key} '{value}' in [[{table}]] number {index + 1}{did_you_mean(value, known)}",
+                      key, table, index)
+
+    def tables(self, name):
+        for index, entry in enumerate(self.data.get(name, [])):
+            if not isinstance(entry, dict):
+                self.fail(f"'{name}' must be tables: [[{name}]]", name)
+            yield index, entry
+
+
+def read_study(path, need_scene=True):
+    """Reads and checks a study file; raises StudyError. `need_scene` = False for the copy in a study's folder."""
+    reader = _Reader(path)
+    data, fail = reader.data, reader.fail
+    reader.check(data, STUDY_KEYS)
+    for key in ("title", "scene"):
+        if key not in data:
+            raise StudyError(f"{path}: lacks the key '{key}'")
+    scene = reader.path.parent / data["scene"]
+    if need_scene and not scene.is_file():
+        fail(f"'scene': no such file: {data['scene']}", "scene")
+    for key, least in (("repeats", 1), ("threads", 1)):
+        if data.get(key, least) < least:
+            fail(f"'{key}' must be at least {least}", key)
+
+    axes, sets = flatten(data.get("axes", {})), flatten(data.get("set", {}))
+    for key, values in axes.items():
+        if not isinstance(values, list) or not values:
+            fail(f"axis '{key}' must be a list with at least one value", key, "axes")
+        if any(same(a, b) for a, b in itertools.combinations(values, 2)):
+            fail(f"axis '{key}' holds a value twice", key, "axes")
+        if key == "method" and not all(isinstance(v, str) for v in values):
+            fail("axis 'method' must hold names of variants", key, "axes")
+        if key in sets:
+            fail(f"'{key}' is set and is an axis, too", key, "set")
+
+    excludes, overrides = [], []
+    for index, entry in reader.tables("exclude"):
+        excludes.append(flatten(entry))
+        for key in excludes[-1]:
+            if key not in axes:
+                fail(f"'{key}' in [[exclude]] number {index + 1} is not an axis{did_you_mean(key, axes)}",
+                     key, "exclude", index)
+    for index, entry in reader.tables("override"):
+        reader.check(entry, {"when": TABLE, "set": TABLE}, "override", index)
+        for key in ("when", "set"):
+            if key not in entry:
+                fail(f"[[override]] number {index + 1} lacks the key '{key}'", "override")
+        when, changes = flatten(entry["when"]), flatten(entry["set"])
+        for key in when:
+            if key not in axes:
+                fail(f"'{key}' in 'when' of [[override]] number {index + 1} is not an axis{did_you_mean(key, axes)}",
+                     key, "override", index)
+        for key in changes:
+            if key in axes:
+                fail(f"'{key}' in 'set' of [[override]] number {index + 1} is an axis", key, "override", index)
+        overrides.append((when, changes))
+
+    combinations, excluded, overridden = [], Counter(), Counter()
+    for values in itertools.product(*axes.values()):
+        chosen = dict(zip(axes, values))
+        out = [i for i, e in enumerate(excludes) if matches(chosen, e)]
+        excluded.update(out)
+        if out:
+            continue
+        combined = dict(sets)
+        combined.update({k: v for k, v in chosen.items() if k not in ("method", "threads")})
+        for i, (when, changes) in enumerate(overrides):
+            if matches(chosen, when):
+                overridden[i] += 1
+                combined.update(changes)
+        method = combined.pop("method", None)
+        threads = combined.pop("threads", data.get("threads", 1))
+        combinations.append(Combination(chosen, combined, chosen.get("method", method),
+                                        chosen.get("threads", threads)))
+    for i in range(len(excludes)):
+        if not excluded[i]:
+            fail(f"[[exclude]] number {i + 1} excludes nothing", next(iter(excludes[i]), "exclude"), "exclude", i)
+    for i, (when, _) in enumerate(overrides):
+        if not overridden[i]:
+            fail(f"[[override]] number {i + 1} applies to nothing", next(iter(when), "when"), "override", i)
+    if not combinations:
+        raise StudyError(f"{path}: every combination is excluded")
+
+    columns = set(COLUMNS) | set(axes)
+
+    def check_where(entry, table, index):
+        where = flatten(entry.get("where", {}))
+        for key in where:
+            if key not in columns:
+                fail(f"unknown key '{key}' in 'where' of [[{table}]] number {index + 1}{did_you_mean(key, columns)}",
+                     key, table, index)
+        return where
+
+    targets, figures = [], []
+    for index, entry in reader.tables("target"):
+        reader.check(entry, TARGET_KEYS, "target", index)
+        for key in ("label", "quantity", "kind"):
+            if key not in entry:
+                fail(f"[[target]] number {index + 1} lacks the key '{key}'", "target")
+        reader.choice(entry["kind"], TARGET_KINDS, "kind", "target", index)
+        reader.need(entry, TARGET_KINDS[entry["kind"]], "target", index, f"the kind '{entry['kind']}'")
+        for key in {"value", "low", "high"} & set(entry) - set(TARGET_KINDS[entry["kind"]]):
+            fail(f"'{key}' in [[target]] number {index + 1} means nothing for the kind '{entry['kind']}'",
+                 key, "target", index)
+        targets.append({**entry, "where": check_where(entry, "target", index)})
+    for index, entry in reader.tables("figure"):
+        if "kind" not in entry:
+            fail(f"[[figure]] number {index + 1} lacks the key 'kind'", "figure")
+        reader.choice(entry["kind"], FIGURE_KINDS, "kind", "figure", index)
+        needed, further = FIGURE_KINDS[entry["kind"]]
+        reader.check(entry, FIGURE_KEYS | needed | further, "figure", index)
+        reader.need(entry, needed, "figure", index, f"the kind '{entry['kind']}'")
+        if "width" in entry:
+            reader.choice(entry["width"], WIDTHS, "width", "figure", index)
+        series = entry.get("series", ["variant"])
+        series = [series] if isinstance(series, str) else series
+        for key in series:
+            if key not in columns:
+                fail(f"unknown key '{key}' in 'series' of [[figure]] number {index + 1}{did_you_mean(key, columns)}",
+                     "series", "figure", index)
+        figures.append({**entry, "series": series, "where": check_where(entry, "figure", index)})
+
+    return StudyFile(reader.path, data["title"], data.get("purpose", ""), scene, data.get("repeats", 1),
+                     combinations, targets, figures)

@@ -1,0 +1,191 @@
+"""Tables: one shape for the page, for CSV and for LaTeX (booktabs)."""
+import csv
+import io
+import math
+import statistics
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from . import metrics
+from .convergence import fit_order, pairwise_orders
+from .targets import mean_by_size, number
+
+
+@dataclass
+class Table:
+    """`header` and `rows` of strings; the first `text_columns` are words, the rest numbers."""
+    name: str
+    title: str
+    header: list
+    rows: list
+    text_columns: int = 1
+    notes: list = field(default_factory=list)
+
+
+def as_csv(table):
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(table.header)
+    writer.writerows(table.rows)
+    return out.getvalue()
+
+
+_LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{",
+          "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "≤": r"$\le$", "≥": r"$\ge$",
+          "−": "$-$", "µ": r"\textmu{}", "×": r"$\times$", "<": r"$<$", ">": r"$>$", "∞": r"$\infty$", "–": "--"}
+
+
+def escape(text):
+    """Text for LaTeX; whole numbers with an exponent become a product."""
+    text = str(text)
+    try:
+        if "e" in text and math.isfinite(float(text)):
+            mantissa, exponent = text.split("e")
+            return rf"${mantissa}\times10^{{{int(exponent)}}}$"
+    except ValueError:
+        pass
+    text = "".join(_LATEX.get(c, c) for c in text)
+    return text.encode("ascii", "replace").decode() if not text.isascii() else text
+
+
+def as_latex(table):
+    columns = "l" * table.text_columns + "r" * (len(table.header) - table.text_columns)
+    lines = [r"% needs \usepackage{booktabs}", rf"\begin{{tabular}}{{{columns}}}", r"\toprule",
+             " & ".join(escape(h) for h in table.header) + r" \\", r"\midrule"]
+    lines += [" & ".join(escape(c) for c in row) + r" \\" for row in table.rows]
+    return "\n".join(lines + [r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
+def _range(values):
+    """'median [min-max]' of finite values."""
+    values = [v for v in values if isinstance(v, (int, float)) and math.isfinite(v)]
+    if not values:
+        return "n/a"
+    middle = number(statistics.median(values))
+    return middle if len(values) < 2 else f"{middle} [{number(min(values))}–{number(max(values))}]"
+
+
+def pairs(study):
+    """(quantity, norm) that occur, in order, without the performance numbers."""
+    keys = dict.fromkeys(key for run in study.runs for key in run.rows)
+    return [key for key in keys if key[0] not in metrics.ALWAYS]
+
+
+def _ratio_note(runs):
+    ratios = [r.value("static", "kinetic_over_strain") for r in runs]
+    ratios = [r for r in ratios if math.isfinite(r)]
+    return [f"Largest kinetic/strain energy ratio of these runs: {number(max(ratios))}."] if ratios else []
+
+
+def _groups(study):
+    """Runs by variant, and within by further axes than method, cell size and repeats, as labels."""
+    further = [k for run in study.runs for k in run.values
+               if k not in ("method", "variant", "L", "ppc", "dt", "seed", "repeat", "grid.cell_size")]
+    varying = [k for k in dict.fromkeys(further) if len({str(r.values.get(k)) for r in study.runs}) > 1]
+    groups = {}
+    for run in study.runs:
+        parts = [run.name] + [f"{k.rsplit('.', 1)[-1]} = {run.values.get(k)}" for k in varying]
+        groups.setdefault(", ".join(parts), []).append(run)
+    return groups
+
+
+def convergence_table(study, quantity, norm):
+    """Rows: cell sizes; per variant the value and, for errors, the order from the row above. None for one size."""
+    groups, ordered = _groups(study), metrics.is_error(quantity, norm)
+    data, sizes = {}, set()
+    for label, runs in groups.items():
+        if any((quantity, norm) in run.rows for run in runs) or any(not run.completed for run in runs):
+            size, mean, _ = mean_by_size(runs, quantity, norm)
+            data[label] = (size[::-1], mean[::-1], runs)
+            sizes.update(size)
+    if len(sizes) < 2:
+        return None
+    header = ["L [m]"]
+    for label in data:
+        header += [label, f"{label} order"] if ordered else [label]
+    rows = []
+    for size in sorted(sizes, reverse=True):
+        row = [f"{size:g}"]
+        for own_sizes, mean, runs in data.values():
+            at = np.flatnonzero(own_sizes == size)
+            if not len(at):
+                row += ["", ""] if ordered else [""]
+                continue
+            status = next((r.status for r in runs if r.values.get("L") == size and not r.completed), None)
+            value = mean[at[0]]
+            row.append(number(float(value)) if math.isfinite(value) else status or "n/a")
+            if ordered:
+                order = pairwise_orders(own_sizes, mean)[at[0]]
+                row.append(f"{order:.2f}" if math.isfinite(order) else "")
+        rows.append(row)
+    if ordered:
+        row = ["fitted order"]
+        for own_sizes, mean, _ in data.values():
+            fit = fit_order(own_sizes, mean)
+            row += ["", str(fit) if math.isfinite(fit.order) else ""]
+        rows.append(row)
+    title = f"{quantity} {norm} against cell size".replace("_", " ")
+    notes = [] if quantity == "static" else _ratio_note(study.runs)
+    return Table(f"{quantity}_{norm}".strip("_"), title, header, rows, notes=notes)
+
+
+def values_table(study):
+    """Every number of studies with one cell size: rows are quantities, columns variants."""
+    groups, keys = _groups(study), pairs(study)
+    if not keys:
+        return None
+    rows = []
+    for key in keys:
+        row = [key[0], key[1]]
+        for runs in groups.values():
+            values = [run.value(*key) for run in runs]
+            row.append(_range(sorted(set(v for v in values if math.isfinite(v)))) if any(map(math.isfinite, values))
+                       else next((r.status for r in runs if not r.completed), "n/a"))
+        rows.append(row)
+    return Table("values", "Measured quantities", ["quantity", "norm", *groups], rows, 2)
+
+
+def performance_table(study):
+    """Timings per variant and cell size; runs on a busy machine are marked."""
+    cores, rows, busy_any = study.plan.get("cores"), [], False
+    for label, runs in _groups(study).items():
+        for size in sorted({r.values.get("L") for r in runs if r.result is not None}, reverse=True):
+            own = [r for r in runs if r.values.get("L") == size and r.result is not None]
+            perf = [r.result.performance for r in own]
+            loads = [r.result.provenance.get("load_average") for r in own]
+            loads = [float(v) for v in loads if isinstance(v, (int, float))]
+            busy = bool(cores and loads and max(loads) > cores)
+            busy_any = busy_any or busy
+            rows.append([label, f"{size:g}", str(perf[0].get("points", "n/a")), str(perf[0].get("steps", "n/a")),
+                         *(_range([p.get(k) for p in perf]) for k in ("solve_s", "setup_s", "output_s")),
+                         _range([p.get("particle_steps_per_second") for p in perf]),
+                         number(float(perf[0].get("bytes_per_point", math.nan))),
+                         (f"{max(loads):.2f}" if loads else "n/a") + (" busy" if busy else ""),
+                         "" if all(r.completed for r in own) else
+                         ", ".join(dict.fromkeys(r.status for r in own if not r.completed))])
+    if not rows:
+        return None
+    notes = ["Medians of repeats [smallest–largest]; solve is the time of the steps alone."]
+    if study.plan.get("jobs", 1) > 1:
+        notes.append(f"Runs went {study.plan['jobs']} at a time: timings are those of a shared machine.")
+    if busy_any:
+        notes.append(f"busy: the load average at the start was above the {cores} cores.")
+    header = ["variant", "L [m]", "points", "steps", "solve [s]", "set-up [s]", "output [s]", "particle steps [1/s]",
+              "memory [B/point]", "load", "status"]
+    return Table("performance", "Performance", header, rows, notes=notes)
+
+
+def targets_table(verdicts):
+    return Table("targets", "Expectations", ["target", "asked", "measured", "verdict", "note", "source"],
+                 [[v.label, v.asked, v.measured, v.verdict, v.note, v.source] for v in verdicts], 6)
+
+
+def study_tables(study):
+    """All tables of a study but the targets."""
+    found = [convergence_table(study, *key) for key in pairs(study)]
+    tables = [t for t in found if t]
+    if not tables:
+        tables = [t for t in (values_table(study),) if t]
+    performance = performance_table(study)
+    return tables + ([performance] if performance else [])

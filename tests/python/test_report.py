@@ -1,0 +1,227 @@
+"""Reports from synthetic studies: what is shown, that it stands alone, and that nothing bad breaks it."""
+import csv
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import pytest
+from conftest import REPORTS
+from synthetic import write_result, write_study
+from testbed_reports.dataset import read_study_folder
+from testbed_reports.report import build
+from testbed_reports.tables import Table, as_latex, convergence_table, escape, performance_table
+
+EXTRA = """
+[[target]]
+label = "LPFDM converges"
+quantity = "stress"
+norm = "l2"
+where = {variant = "lpfdm"}
+kind = "order_min"
+value = 1.8
+source = "theory <&>"
+[[target]]
+label = "FEM is exact"
+quantity = "stress"
+norm = "l2"
+where = {variant = "fem-q2"}
+kind = "value_max"
+value = 1e-3
+[[figure]]
+kind = "convergence"
+quantity = "stress"
+norm = "l2"
+orders = [1, 2]
+[[figure]]
+kind = "work_precision"
+quantity = "displacement"
+norm = "l2"
+[[figure]]
+kind = "profile"
+component = "stress_yy"
+[[figure]]
+kind = "field"
+component = "stress_yy"
+[[figure]]
+kind = "history"
+probe = "tip"
+quantity = "displacement_y"
+scale_x = "period"
+scale_y = "static_displacement"
+[[figure]]
+kind = "history"
+quantity = "total_energy"
+[[figure]]
+kind = "bars"
+quantity = "particle_steps_per_second"
+[[figure]]
+kind = "bars"
+quantity = "nothing"
+"""
+
+
+def change(variant, L, repeat):
+    """A diverged run, a killed one, one on a busy machine."""
+    if variant == "mpm-cpgimp" and L == 0.5:
+        return {"status": "diverged", "reason": "velocity above <c_p>"}
+    if variant == "mpm-linear" and L == 0.5:
+        return None
+    return {"load": 5.0} if variant == "lpfdm" and L == 2.0 else {}
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    root = tmp_path_factory.mktemp("report")
+    folder = write_study(root / "studies" / "column", EXTRA, sizes=(2.0, 1.0, 0.5), left_out=["fem-q2"], change=change,
+                         metrics="stress,displacement,static,nonsense",
+                         history={"strain_energy": [1.0] * 80 + [2.0]})
+    bad = folder / "runs" / "lpfdm_L1_r1_0" / "result.h5"
+    bad.write_bytes(bad.read_bytes()[:5000])
+    write_result(folder / "runs" / "stale_0" / "result.h5", variant="stale")
+    broken = root / "studies" / "broken"
+    broken.mkdir()
+    (broken / "study.toml").write_text("title = 1\n")
+    build([root / "studies"], root / "out", "testbed report studies")
+    return root / "out"
+
+
+@pytest.fixture(scope="module")
+def page(report):
+    return (report / "report.html").read_text()
+
+
+def text_of(page):
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", re.sub(r"<style>.*?</style>", "", page, flags=re.S)))
+
+
+def test_figures_for_print(report):
+    names = {p.name for p in (report / "figures").glob("*.pdf")}
+    assert {"column_convergence_stress_l2.pdf", "column_field_stress_yy.pdf", "column_history_total_energy.pdf"} <= names
+    assert len(names) == 7 and all((report / "figures" / n).read_bytes().startswith(b"%PDF") for n in names)
+
+
+def test_page_stands_alone(page):
+    rest = re.sub(r"data:[^\"']*", "", page)
+    assert not re.search(r"https?://|file://|<script|<link(?![^>]*href=\"\")|@import|url\(", rest)
+    assert len(re.findall(r'<img src="data:image/svg\+xml;base64,', page)) == 7
+    class Balance(HTMLParser):
+        stack = []
+        def handle_starttag(self, tag, attributes):
+            if tag not in ("meta", "link", "img", "br"):
+                self.stack.append(tag)
+        def handle_endtag(self, tag):
+            assert self.stack.pop() == tag
+    parser = Balance()
+    parser.feed(page)
+    assert parser.stack == []
+
+
+def test_page_says_what_failed(page):
+    text = text_of(page)
+    for told in ("velocity above &lt;c_p&gt;", "killed by signal 9", "unreadable", "nonsense", "not drawn", "the whole study",
+                 "testbed-fem) is not built", "abc1234", "theory &lt;&amp;&gt;", "testbed study column.toml"):
+        assert told in text, told
+    assert "stale" not in text
+
+
+def test_verdicts_on_page(page):
+    text = text_of(page)
+    assert "1 fail, 1 not run" in text and "✗ fail" in text  # an unreadable run is no pass
+    assert "kinetic/strain energy" in text
+
+
+def test_busy_machine_is_marked(report):
+    with open(report / "tables" / "column_performance.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [r["load"] for r in rows if r["variant"] == "lpfdm" and r["L [m]"] == "2"] == ["5.00 busy"]
+    assert [r["status"] for r in rows if r["variant"] == "mpm-cpgimp" and r["L [m]"] == "0.5"] == ["diverged"]
+
+
+def test_convergence_table(tmp_path):
+    study = read_study_folder(write_study(tmp_path / "c", sizes=(2.0, 1.0, 0.5), metrics="stress", change=change))
+    table = convergence_table(study, "stress", "l2")
+    rows = {row[0]: dict(zip(table.header, row)) for row in table.rows}
+    assert rows["1"]["lpfdm"] == "0.0200" and rows["1"]["lpfdm order"] == "2.00" and rows["2"]["lpfdm order"] == ""
+    assert rows["0.5"]["mpm-cpgimp"] == "diverged" and rows["0.5"]["mpm-linear"] == "missing"
+    assert rows["fitted order"]["fem-q2 order"].startswith("2.00")
+
+
+def test_performance_medians(tmp_path):
+    study = read_study_folder(write_study(tmp_path / "p", sizes=(1.0,), models={"lpfdm": lambda L: 0.1}, repeats=3,
+                                          change=lambda v, L, r: {"solve_s": [1.0, 5.0, 2.0][r - 1]}))
+    row = dict(zip(performance_table(study).header, performance_table(study).rows[0]))
+    assert row["solve [s]"] == "2.00 [1.00–5.00]" and row["memory [B/point]"] == "200"
+
+
+def test_latex(report):
+    files = list((report / "tables").glob("*.tex"))
+    assert len(files) == len(list((report / "tables").glob("*.csv"))) > 5
+    for path in files:
+        text = path.read_text()
+        assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") == text.count(r"\toprule") == \
+            text.count(r"\midrule") == text.count(r"\bottomrule") == 1
+        columns = len(re.search(r"\\begin\{tabular\}\{([lr]+)\}", text).group(1))
+        body = text.split(r"\toprule")[1].split(r"\bottomrule")[0]
+        for line in body.splitlines():
+            if line.endswith(r"\\"):
+                assert len(re.findall(r"(?<!\\)&", line)) == columns - 1, line
+        assert not re.search(r"(?<!\\)[%#_]", body.replace("_{", "")) and text.isascii()
+        depth = 0
+        for c in re.sub(r"\\[{}]", "", text):
+            depth += (c == "{") - (c == "}")
+            assert depth >= 0
+        assert depth == 0
+
+
+def test_escape():
+    assert escape("a_b & 5%") == r"a\_b \& 5\%" and escape("1.50e-04") == r"$1.50\times10^{-4}$"
+    assert escape("≤ 1–2") == r"$\le$ 1--2"
+    assert "\\begin{tabular}{lr}" in as_latex(Table("n", "t", ["a", "b"], [["x", "1"]]))
+
+
+def test_same_variant_same_look():
+    from testbed_reports.style import Style
+    style = Style(["mpm-b", "lpfdm", "fem-q2", "mpm-a", "lpfdm-2000"])
+    looks = [str(style.of(v)) for v in ("lpfdm", "lpfdm-2000", "mpm-a", "mpm-b", "fem-q2")]
+    assert len(set(looks)) == 5 and str(style.of("lpfdm")) == looks[0]
+    assert len({style.colour(v) for v in style.slots}) == 5 == len({style.marker(v) for v in style.slots})
+
+
+def test_every_run_lost_still_makes_a_page(tmp_path):
+    folder = write_study(tmp_path / "lost", EXTRA, sizes=(1.0,), change=lambda *_: None)
+    out = build([folder], tmp_path / "out", "testbed report lost")
+    assert text_of(out.read_text()).count("killed by signal 9") >= 4
+
+
+def test_every_run_diverged_still_makes_a_page(tmp_path):
+    folder = write_study(tmp_path / "lost", EXTRA, sizes=(1.0,), metrics="stress",
+                         change=lambda *_: {"status": "diverged", "reason": "not a number"})
+    assert "not a number" in build([folder], tmp_path / "out", "testbed report lost").read_text()
+
+
+def test_command(tmp_path):
+    write_study(tmp_path / "all" / "one", sizes=(2.0, 1.0))
+    done = subprocess.run([REPORTS / "testbed-report", "all", "-o", "page"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout == "page/report.html\n", done.stderr
+    done = subprocess.run([REPORTS / "testbed-report", "nowhere"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1 and "nowhere" in done.stderr
+
+
+@pytest.mark.skipif(not shutil.which("chromium"), reason="chromium is not installed")
+def test_in_a_browser(report, tmp_path):
+    """Every picture loads with a size, and the console stays silent. The probe is added to a copy of the page."""
+    probe = """<script>addEventListener('load', () => { document.title = 'IMAGES ' +
+      [...document.images].map(i => i.naturalWidth > 0 && i.naturalHeight > 0 && i.clientWidth > 100).join(' ') +
+      ' WIDE ' + (document.documentElement.scrollWidth <= innerWidth); });</script>"""
+    copy = tmp_path / "copy.html"
+    copy.write_text((report / "report.html").read_text().replace("</body>", probe + "</body>"))
+    options = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0",
+               f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1200,1000"]
+    done = subprocess.run([*options, "--dump-dom", copy.as_uri()], capture_output=True, text=True, timeout=50)
+    title = re.search(r"<title>(.*?)</title>", done.stdout).group(1)
+    assert title == "IMAGES " + " ".join(["true"] * 7) + " WIDE true", title
+    assert "CONSOLE" not in done.stderr
+    picture = tmp_path / "page.png"
+    subprocess.run([*options, f"--screenshot={picture}", (report / "report.html").as_uri()], capture_output=True, timeout=50)
+    assert picture.stat().st_size > 20000
