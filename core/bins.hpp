@@ -94,6 +94,8 @@ private:
             return outside;
         if constexpr (has_box)
         {
+            if (!(points.half_x[p] > 0 && points.half_y[p] > 0))
+                return outside;
             const double hx = std::min(points.half_x[p] / L, 0.5), hy = std::min(points.half_y[p] / L, 0.5);
             return static_cast<std::uint32_t>(lattice_.cell(static_cast<int>(std::floor(cx - hx + bin_tolerance)),
                                                             static_cast<int>(std::floor(cy - hy + bin_tolerance))));

@@ -23,7 +23,8 @@ public:
     bool active() const { return !data_.empty(); }
     std::size_t bytes() const { return data_.capacity() * sizeof(T); }
 
-    /// Allocates n values, padded so that a pack may be loaded from any of them.
+    /// Allocates n values, padded so that a pack may be loaded from any of them. The padding holds the same value: what a kernel
+    /// makes of it is masked, but must be finite.
     void activate(std::size_t n, T value = T{}) { data_.assign(n + pack_size, value); }
 
     T* data() { return data_.data(); }
@@ -44,6 +45,8 @@ public:
     {
         scratch.resize(data_.size());
         parallel_for(order.size(), [&](std::size_t p) { scratch[p] = data_[order[p]]; });
+        std::copy(data_.begin() + static_cast<std::ptrdiff_t>(order.size()), data_.end(),
+                  scratch.begin() + static_cast<std::ptrdiff_t>(order.size()));
         data_.swap(scratch);
     }
 

@@ -118,6 +118,10 @@ def _number(value):
     return repr(float(value)) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
 
 
+def _count(value):
+    return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else value
+
+
 def metrics_csv(runs):
     """metrics.csv of the runs that have a finished result, as text."""
     out = io.StringIO()
@@ -131,6 +135,6 @@ def metrics_csv(runs):
             writer.writerow([run.id, run.result.case, run.result.method, run.result.variant,
                              _number(run.values["L"]), run.values["ppc"], _number(run.values["dt"]),
                              run.values["seed"], quantity, norm, repr(float(value)),
-                             _number(performance.get("solve_s", "")), performance.get("particle_steps", ""),
+                             _number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")),
                              run.status])
     return out.getvalue()

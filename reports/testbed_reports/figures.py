@@ -83,11 +83,11 @@ def by_series(runs, entry, style):
     groups = {}
     for run in runs:
         groups.setdefault(label_of(run, entry), []).append(run)
-    return dict(sorted(groups.items(), key=lambda item: style.slot(item[0])))
+    return dict(sorted(groups.items(), key=lambda item: style.rank(item[0])))
 
 
 def one_size(runs, entry):
-    """Runs at the asked cell size(s), else at the finest that all variants have."""
+    """Runs at the asked cell size(s), else at the finest that is planned for all variants."""
     asked = entry.get("L")
     if asked is not None:
         sizes = asked if isinstance(asked, list) else [asked]
@@ -97,10 +97,10 @@ def one_size(runs, entry):
         return found
     per_variant = {}
     for run in runs:
-        if isinstance(run.values.get("L"), (int, float)) and run.result is not None:
+        if isinstance(run.values.get("L"), (int, float)):
             per_variant.setdefault(run.name, set()).add(run.values["L"])
     if not per_variant:
-        raise FigureError("no run has a result")
+        raise FigureError("no run has a cell size")
     common = set.intersection(*per_variant.values())
     finest = min(common) if common else None
     return [r for r in runs if (r.values.get("L") == finest if finest is not None
@@ -230,7 +230,8 @@ def convergence(study, entry, style):
 
     # Methods that diverge must not flatten the picture: cap at ten times the largest error on the coarsest cells.
     coarsest = max(a for a, _ in finite)
-    cap = max([b for a, b in finite if a >= coarsest / 1.001]) * 10
+    graded = metrics.is_error(quantity, norm)
+    cap = max([b for a, b in finite if a >= coarsest / 1.001]) * (10 if graded else 2)
     low, top = min(b for _, b in finite), min(max(b for _, b in finite), cap)
     everything = [a for a, _ in finite] + [a for where in failing.values() for a in where]
     high = top * 1.6
@@ -242,9 +243,9 @@ def convergence(study, entry, style):
         shown = np.where(data[1] > high, np.nan, data[1])
         spread = (data[3] > data[2] * (1 + 1e-9)).any()
         if spread:
-            axis.fill_between(data[0], data[2], np.minimum(data[3], high), color=style.colour(label), alpha=0.15,
+            axis.fill_between(data[0], data[2], data[3], where=data[1] <= high, color=style.colour(label), alpha=0.15,
                               linewidth=0)
-        axis.plot(data[0], np.minimum(data[1], high * 10), **{**style.of(label), "marker": ""})
+        axis.plot(data[0], np.minimum(data[1], high * 1e3), **{**style.of(label), "marker": ""})
         axis.plot(data[0], shown, **{**style.of(label), "linestyle": "none"})
         over = data[0][data[1] > high]
         capped = capped or len(over) > 0
@@ -253,10 +254,14 @@ def convergence(study, entry, style):
         if spread:
             notes.append("Lines are means, bands the range")
     axis.set_xscale("log")
-    axis.set_yscale("log")
-    if entry.get("orders"):
-        low = min(low, _triangle(axis, entry["orders"], finite, min(everything), max(everything)))
-    _log_y(axis, low / 1.6, high)
+    if graded or top > 30 * low:
+        axis.set_yscale("log")
+        if entry.get("orders"):
+            low = min(low, _triangle(axis, entry["orders"], finite, min(everything), max(everything)))
+        _log_y(axis, low / 1.6, high)
+    else:  # a ratio, not an error
+        margin = 0.15 * (top - low) or 0.1 * abs(top)
+        axis.set_ylim(low - margin, top + margin)
     span = max(everything) / min(everything)
     axis.set_xlim(min(everything) / span**0.05 / 1.02, max(everything) * span**0.05 * 1.02)
     _sizes_axis(axis.xaxis, everything)
@@ -380,8 +385,8 @@ def profile(study, entry, style):
         panels.setdefault(keys(line), []).append(line)
     several_sizes = len({line[1].values["L"] for line in lines}) > 1
     width = WIDTH[entry.get("width", "page" if len(panels) > 1 else "column")]
-    columns = min(len(panels), max(1, int(width / 1.5)))
-    rows = math.ceil(len(panels) / columns)
+    rows = math.ceil(len(panels) / max(1, int(width / 1.5)))
+    columns = math.ceil(len(panels) / rows)  # rows of like length
 
     def text(line):
         parts = [line[0]] if split_by != "variant" else []
@@ -398,7 +403,7 @@ def profile(study, entry, style):
     has_exact = any(line[4] is not None for line in lines)
     columns_l, rows_l = legend_shape(names + (["exact"] if has_exact else []), width)
     titles = len(panels) > 1
-    figure, axes = frame(width, 2.2, rows_l, rows, columns, left=0.55, right=0.12, gap=(0.2, 0.65 if titles else 0.4),
+    figure, axes = frame(width, 2.2, rows_l, rows, columns, left=0.55, right=0.12, gap=(0.2, 0.36),
                          rails=1.4 if titles else 0, sharex=True, sharey=True)
     handles = {}
     for k, (title, own) in enumerate(panels.items()):
@@ -492,19 +497,22 @@ def field_maps(study, entry, style):
     base = shown[0][2].unit(name) or components.default_unit(name)
 
     width = WIDTH[entry.get("width", "page")]
-    left, right, gap, top, bottom = 0.5, 0.85, 0.12, 0.28, 0.42
+    left, right, gap, top, bottom = 0.5, 1.0, 0.12, 0.28, 0.42
     room = width - left - right
-    columns = min(entry.get("columns", len(shown)), len(shown), max(1, int(room / 0.8)))
+    most = max(1, int(room / (1.5 if x1 - x0 > 1.3 * (y1 - y0) else 0.8)))
+    columns = min(entry.get("columns", most), len(shown), max(1, int(room / 0.8)))
+    bands = math.ceil(len(shown) / columns)
+    if "columns" not in entry:
+        columns = math.ceil(len(shown) / bands)  # rows of like length
     panel = (room - (columns - 1) * gap) / columns
     height = panel * (y1 - y0) / (x1 - x0)
     if height > 2.6:  # tall and narrow bodies
         height, panel = 2.6, 2.6 * (x1 - x0) / (y1 - y0)
         spread = (room - columns * panel) / max(1, columns - 1) if columns > 1 else 0
         gap = min(spread, 1.0)
-    bands = math.ceil(len(shown) / columns)
     kinds = [("value", values)] + ([("error", errors)] if with_error else [])
     rows = bands * len(kinds)
-    step = max(height, 0.7) + top
+    step = height + top
     total = rows * step + bottom + 0.02
     figure = plt.figure(figsize=(width, total))
     for kind_index, (kind, data) in enumerate(kinds):
@@ -540,11 +548,13 @@ def field_maps(study, entry, style):
                 axis.set_xlabel("$x$ [m]")
             else:
                 axis.tick_params(labelbottom=False)
-        edge = left + columns * panel + (columns - 1) * gap + 0.12
-        y_low = total - (kind_index + 1) * bands * step
-        bar = figure.add_axes([edge / width, y_low / total, 0.09 / width, height / total])
+        overhang = max(0.0, (max(len(label) for label, _, _ in shown) * 0.07 - panel) / 2)  # of a long title
+        edge = left + columns * panel + (columns - 1) * gap + 0.12 + min(overhang, 0.3)
+        y_low, y_high = total - (kind_index + 1) * bands * step, total - kind_index * bands * step - top
+        bar = figure.add_axes([edge / width, y_low / total, 0.09 / width, (y_high - y_low) / total])
         colours = figure.colorbar(mapped, cax=bar, extend="both")
         colours.outline.set_linewidth(0.4)
+        colours.ax.locator_params(nbins=max(2, min(6, int((y_high - y_low) / 0.3))))
         colours.set_label(f"{'Error of ' if kind == 'error' else ''}"
                           f"{components.symbol(component).split(' ')[-1] if kind == 'error' else components.symbol(component)}"
                           f" [{unit}]")
@@ -596,6 +606,8 @@ def history(study, entry, style):
                 notes.append(f"{label} ({short('L', run.values['L'])}) {run.status}: {run.reason}".rstrip(": "))
             time, values = run.result.history("time"), _history_values(run.result, entry)
             sx, sy = _scale(run, entry.get("scale_x")), _scale(run, entry.get("scale_y"))
+            if entry.get("log"):
+                values = np.where(values > 0, values, np.nan)
             keep = time <= entry.get("t_max", math.inf)
             lines.append((label, run, time[keep] / sx, values[keep] / sy))
             true = _history_values(run.result, entry, True)
@@ -612,6 +624,7 @@ def history(study, entry, style):
     factor = 1.0
     if "scale_y" in entry:
         by = entry["scale_y"]
+        title = title.split(" ")[-1] if "$" in title else title
         title, unit = f"{title} / {by.replace('_', ' ') if isinstance(by, str) else number(by)}", ""
     else:
         unit, factor = _axis_scale(bounded, unit)
@@ -659,6 +672,12 @@ def bars(study, entry, style):
         rows[label] = np.percentile(good, [50, 0, 100]) if good else None
     if all(v is None for v in rows.values()):
         raise FigureError(f"no completed run has {quantity} {norm}".rstrip())
+    title, largest = name_of(quantity, norm), max(abs(v[2]) for v in rows.values() if v is not None)
+    if largest >= 1e4 and not entry.get("log"):  # the power of ten goes into the unit
+        power = 3 * int(math.log10(largest) // 3)
+        rows = {label: None if v is None else v / 10.0**power for label, v in rows.items()}
+        title = title.replace("[1/", "[").replace("[", rf"[$10^{{{power}}}$" + ("/" if "[1/" in title else " ")) \
+            if "[" in title else rf"{title} [$10^{{{power}}}$]"
     width = WIDTH[entry.get("width", "column")]
     longest = max(len(label) for label in rows)
     figure, axes = frame(width, 0.24 * len(rows) + 0.15, left=0.15 + 0.073 * longest, right=0.55)
@@ -686,7 +705,7 @@ def bars(study, entry, style):
         axis.set_xscale("log")
     else:
         axis.locator_params(axis="x", nbins=5)
-    axis.set_xlabel(name_of(quantity, norm))
+    axis.set_xlabel(title)
     if any(v is not None and v[2] > v[1] for v in rows.values()):
         notes.append("Medians with their range")
     return Drawing(figure, runs, notes)

@@ -1,4 +1,5 @@
 """How figures look: one colour, marker and line per variant everywhere, readable in grey; 8 pt at print size."""
+import itertools
 import math
 
 import matplotlib
@@ -9,9 +10,11 @@ from matplotlib import pyplot as plt  # noqa: E402
 
 WIDTH = {"column": 3.4, "page": 7.0}  # inches
 # Okabe and Ito's palette without its yellow, which is lost on white.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#7F7F7F")
+MARKERS = ("o", "s", "^", "D", "v", "P", "<", "p", ">", "*")
 LINES = ("-", "--", "-.", (0, (1, 1)), (0, (5, 1, 1, 1, 1, 1)))
+# Variants that keep their look in every report, whatever else is in it; others follow.
+KNOWN = ("lpfdm", "mpm-linear", "mpm-cpgimp", "fem-q2", "lpfdm-2000", "mpm-linear-bbar", "fem-q1")
 EXACT = {"color": "black", "linestyle": "-", "linewidth": 1.6, "alpha": 0.35, "label": "exact"}
 RAIL = "0.45"
 
@@ -24,13 +27,20 @@ RC = {"font.size": 8, "font.family": "DejaVu Sans", "axes.labelsize": 8, "axes.t
 
 
 class Style:
-    """Gives each label its colour, marker and line; the order of labels decides, so give all of a report at once."""
+    """Gives each label its colour, marker and line; the set of labels decides, so give all of a report at once."""
 
     def __init__(self, labels):
-        self.slots = {label: k for k, label in enumerate(sorted(set(labels), key=_family_order))}
+        self.labels = sorted(set(labels), key=_family_order)
+        self.slots = {label: KNOWN.index(label) for label in self.labels if label in KNOWN}
+        free = (k for k in itertools.count() if k not in set(self.slots.values()))
+        self.slots.update({label: k for label, k in zip((v for v in self.labels if v not in KNOWN), free)})
 
     def slot(self, label):
-        return self.slots.setdefault(label, len(self.slots))
+        return self.slots.setdefault(label, max(self.slots.values(), default=-1) + 1)
+
+    def rank(self, label):
+        """Place of a label in legends."""
+        return self.labels.index(label) if label in self.labels else len(self.labels)
 
     def colour(self, label):
         return COLOURS[self.slot(label) % len(COLOURS)]

@@ -66,6 +66,10 @@ def _range(values):
     return middle if len(values) < 2 else f"{middle} [{number(min(values))}–{number(max(values))}]"
 
 
+def _whole(value):
+    return str(int(value)) if isinstance(value, (int, float)) and math.isfinite(value) else "n/a"
+
+
 def pairs(study):
     """(quantity, norm) that occur, in order, without the performance numbers."""
     keys = dict.fromkeys(key for run in study.runs for key in run.rows)
@@ -157,7 +161,7 @@ def performance_table(study):
             loads = [float(v) for v in loads if isinstance(v, (int, float))]
             busy = bool(cores and loads and max(loads) > cores)
             busy_any = busy_any or busy
-            rows.append([label, f"{size:g}", str(perf[0].get("points", "n/a")), str(perf[0].get("steps", "n/a")),
+            rows.append([label, f"{size:g}", _whole(perf[0].get("points")), _whole(perf[0].get("steps")),
                          *(_range([p.get(k) for p in perf]) for k in ("solve_s", "setup_s", "output_s")),
                          _range([p.get("particle_steps_per_second") for p in perf]),
                          number(float(perf[0].get("bytes_per_point", math.nan))),

@@ -93,7 +93,8 @@ def test_energy_drift_per_period(make):
 
 
 def test_kinetic_energy_retained(make):
-    r = rows(make(metrics="energy", samples=3, history={"kinetic_energy": np.array([4.0, 9.0, 1.0])}))
+    r = rows(make(metrics="energy", samples=3, reference={"period": None}, history={
+        "kinetic_energy": np.array([4.0, 9.0, 1.0])}))
     assert r["kinetic_energy", "retained"] == pytest.approx(0.25)
 
 

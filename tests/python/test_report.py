@@ -186,6 +186,7 @@ def test_same_variant_same_look():
     looks = [str(style.of(v)) for v in ("lpfdm", "lpfdm-2000", "mpm-a", "mpm-b", "fem-q2")]
     assert len(set(looks)) == 5 and str(style.of("lpfdm")) == looks[0]
     assert len({style.colour(v) for v in style.slots}) == 5 == len({style.marker(v) for v in style.slots})
+    assert str(Style(["mpm-x", "lpfdm"]).of("lpfdm")) == looks[0]  # the same in every report
 
 
 def test_every_run_lost_still_makes_a_page(tmp_path):
