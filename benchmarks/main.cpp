@@ -3,6 +3,7 @@
 #include "core/provenance.hpp"
 #include "core/results.hpp"
 #include "core/run.hpp"
+#include "core/run_options.hpp"
 #include "lpfdm/lpfdm.hpp"
 #include "mpm/mpm.hpp"
 
@@ -135,20 +136,10 @@ int run(int argc, char** argv)
     RunOptions options;
     bool resolved = false;
     std::string table;
-    const auto scene_options = [&](CLI::App* command) {
-        command->add_option("scene", options.scene, "scene file (TOML)")->required();
-        command->add_option("--method", options.method, "method variant, see `testbed list`");
-        command->add_option("--set", options.overrides, "override a key: path.to.key=value; list entries by number or name")
-            ->allow_extra_args(false);
-        command->add_flag("--strict", options.strict, "warnings are errors");
-    };
     CLI::App* run_command = app.add_subcommand("run", "run a scene and write a result file");
-    scene_options(run_command);
-    run_command->add_option("-o,--output", options.output, "result file (default CASE_METHOD.h5)");
-    run_command->add_option("--threads", options.threads, "OpenMP threads; the result does not depend on it")->check(CLI::Range(1, 1024));
-    run_command->add_flag("--quiet", options.quiet, "no progress, no summary");
+    add_run_options(*run_command, options);
     CLI::App* check_command = app.add_subcommand("check", "parse a scene and say what it would use");
-    scene_options(check_command);
+    add_scene_options(*check_command, options);
     check_command->add_flag("--resolved", resolved, "print the scene with all its defaults, as TOML");
     CLI::App* doc_command = app.add_subcommand("doc", "every table and key of a scene");
     doc_command->add_option("table", table, "only this table");

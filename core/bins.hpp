@@ -30,25 +30,27 @@ public:
 
     const std::vector<Bin>& list() const { return bins_; }
 
-    /// Sorts the points by bin. @throws Diverged when a point has left the lattice or its position is not finite.
+    /// Sorts the points by bin. @param workspace grows to the number of points
+    /// @throws Diverged when a point has left the lattice or its position is not finite.
     template <bool has_box>
-    void rebuild(Points& points)
+    void rebuild(Points& points, std::vector<double>& workspace)
     {
         const std::size_t n = points.count;
-        key_.resize(n);
-        parallel_for(n, [&](std::size_t p) { key_[p] = key<has_box>(points, p); });
+        place_.resize(n);  // first the bin of each point, then where it goes
+        parallel_for(n, [&](std::size_t p) { place_[p] = key<has_box>(points, p); });
         for (const Bin& b : bins_)
             slot_[lattice_.cell(b.i, b.j)] = -1;
         bins_.clear();
         for (std::size_t p = 0; p < n; ++p)
         {
-            if (key_[p] == outside)
+            const std::uint32_t key = place_[p];
+            if (key == outside)
                 throw_left_lattice(points, p);
-            std::int32_t& slot = slot_[key_[p]];
+            std::int32_t& slot = slot_[key];
             if (slot < 0)
             {
                 slot = static_cast<std::int32_t>(bins_.size());
-                bins_.push_back({lattice_.cell_i(key_[p]), lattice_.cell_j(key_[p]), 0, 0});
+                bins_.push_back({lattice_.cell_i(key), lattice_.cell_j(key), 0, 0});
             }
             ++bins_[static_cast<std::size_t>(slot)].end;  // a count for now
         }
@@ -62,23 +64,22 @@ public:
             begin += count;
             slot_[lattice_.cell(bins_[b].i, bins_[b].j)] = static_cast<std::int32_t>(b);
         }
-        order_.resize(n);
         bool sorted = true;
-        for (std::uint32_t p = 0; p < n; ++p)
+        for (std::size_t p = 0; p < n; ++p)
         {
-            const std::uint32_t to = bins_[static_cast<std::size_t>(slot_[key_[p]])].end++;
-            order_[to] = p;
-            sorted &= to == p;
+            place_[p] = bins_[static_cast<std::size_t>(slot_[place_[p]])].end++;
+            sorted &= place_[p] == p;
         }
-        if (!sorted)
-            points.for_each_field([&](auto& field) { reorder(field); });
+        if (sorted)
+            return;
+        make_room(workspace, n);
+        points.for_each_field([&](auto& field) { field.reorder(place_, workspace.data()); });
     }
 
     std::size_t bytes() const
     {
         return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) +
-               (key_.capacity() + order_.capacity()) * sizeof(std::uint32_t) + scratch_.capacity() * sizeof(double) +
-               scratch_id_.capacity() * sizeof(std::uint32_t);
+               place_.capacity() * sizeof(std::uint32_t);
     }
 
 private:
@@ -105,15 +106,10 @@ private:
 
     [[noreturn]] static void throw_left_lattice(const Points& points, std::size_t p);
 
-    void reorder(Field<double>& field) { field.reorder(order_, scratch_); }
-    void reorder(Field<std::uint32_t>& field) { field.reorder(order_, scratch_id_); }
-
     Lattice lattice_;
     std::vector<Bin> bins_;
     std::vector<std::int32_t> slot_;
-    std::vector<std::uint32_t> key_, order_;
-    std::vector<double> scratch_;
-    std::vector<std::uint32_t> scratch_id_;
+    std::vector<std::uint32_t> place_;
 };
 
 /// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), no longer does; true for NaN.

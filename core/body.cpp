@@ -65,8 +65,13 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
         q.count = n;
         q.initial_volume = h * h;
         q.mass = material.density * h * h;
-        for (Field<double>* field : {&q.x, &q.y, &q.X, &q.Y, &q.sxx, &q.syy, &q.sxy})
+        for (Field<double>* field : {&q.x, &q.y, &q.sxx, &q.syy, &q.sxy})
             field->activate(n);
+        if (needs.initial_position)
+        {
+            q.X.activate(n);
+            q.Y.activate(n);
+        }
         q.id.activate(n);
         if (needs.box)
         {
@@ -87,14 +92,20 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
             velocity.emplace(*spec.velocity, constants);
         for (std::size_t p = 0; p < n; ++p)
         {
-            q.x[p] = q.X[p] = positions[p][0];
-            q.y[p] = q.Y[p] = positions[p][1];
+            const Vec2& X = positions[p];
+            q.x[p] = X[0];
+            q.y[p] = X[1];
+            if (needs.initial_position)
+            {
+                q.X[p] = X[0];
+                q.Y[p] = X[1];
+            }
             q.id[p] = next_id++;
             if (varies)
                 q.stiffness[p] = stiffness[p] / largest;
             if (velocity)
             {
-                const Vec2 v = (*velocity)({.X = q.X[p], .Y = q.Y[p], .x = q.X[p], .y = q.Y[p]});
+                const Vec2 v = (*velocity)({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
                 q.vx[p] = v[0];
                 q.vy[p] = v[1];
             }

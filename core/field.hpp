@@ -7,11 +7,19 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
 namespace testbed
 {
+/// Room for n numbers whose old values are not needed: no more than that, where resize() may take twice as much.
+inline void make_room(std::vector<double>& workspace, std::size_t n)
+{
+    if (workspace.size() < n)
+        std::vector<double>(n).swap(workspace);
+}
+
 template <class T>
 class Field
 {
@@ -40,14 +48,11 @@ public:
         return data_[p];
     }
 
-    /// Value p becomes the old value order[p]; scratch is swapped in.
-    void reorder(const std::vector<std::uint32_t>& order, std::vector<T>& scratch)
+    /// Value p goes to place[p], by way of `workspace`, which must hold as many.
+    void reorder(std::span<const std::uint32_t> place, double* workspace)
     {
-        scratch.resize(data_.size());
-        parallel_for(order.size(), [&](std::size_t p) { scratch[p] = data_[order[p]]; });
-        std::copy(data_.begin() + static_cast<std::ptrdiff_t>(order.size()), data_.end(),
-                  scratch.begin() + static_cast<std::ptrdiff_t>(order.size()));
-        data_.swap(scratch);
+        parallel_for(place.size(), [&](std::size_t p) { workspace[place[p]] = static_cast<double>(data_[p]); });
+        parallel_for(place.size(), [&](std::size_t p) { data_[p] = static_cast<T>(workspace[p]); });
     }
 
 private:

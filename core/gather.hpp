@@ -33,6 +33,7 @@ public:
             }
         });
         std::sort(active_.begin(), active_.end());
+        active_.shrink_to_fit();
         begin_.assign(active_.size() + 1, 0);
         for (std::size_t a = 0; a < active_.size(); ++a)
             position_[active_[a]] = static_cast<std::int32_t>(a);

@@ -1,5 +1,7 @@
 #include "core/observer.hpp"
 
+#include "core/geometry.hpp"
+
 #include <cmath>
 #include <fmt/format.h>
 
@@ -7,12 +9,24 @@ namespace testbed
 {
 namespace
 {
-/// Sums over all points of all bodies: strain energy [J/m] and sum of m u [kg].
+/// Sums over all points of all bodies: strain energy [J/m] and sum of m x [kg].
 struct PointSums
 {
     double strain_energy = 0, max_stress = 0;
     Vec2 moment{0, 0};
 };
+
+/// Initial positions of all points, by id. Points need not carry them: they follow from the scene.
+std::vector<Vec2> initial_positions(const Scene& scene)
+{
+    std::vector<Vec2> all;
+    for (const BodySpec& body : scene.bodies)
+    {
+        const std::vector<Vec2> part = fill(body, scene.grid);
+        all.insert(all.end(), part.begin(), part.end());
+    }
+    return all;
+}
 
 PointSums point_sums(const std::vector<Body>& bodies)
 {
@@ -24,7 +38,7 @@ PointSums point_sums(const std::vector<Body>& bodies)
         const auto s = ordered_sum<3>(q.count, [&](std::size_t p) {
             const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
             const double energy = elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}) / softer;
-            return std::array<double, 3>{energy * q.current_volume(p), q.mass * (q.x[p] - q.X[p]), q.mass * (q.y[p] - q.Y[p])};
+            return std::array<double, 3>{energy * q.current_volume(p), q.mass * q.x[p], q.mass * q.y[p]};
         });
         total.strain_energy += s[0];
         total.moment[0] += s[1];
@@ -59,17 +73,20 @@ Observer::Observer(const Scene& scene, const Solver& solver) : scene_(scene), so
                 {"angular_momentum", "kg m/s"},
                 {"unbalanced_force", "-"},
                 {"max_stress", "Pa"}};
+    last_moment_ = point_sums(solver.bodies()).moment;
+    const std::vector<Vec2> initial = initial_positions(scene);
     for (const ProbeSpec& spec : scene.probes)
     {
         const Expression where(spec.where, constants);
         Probe probe{spec.name};
-        for (const Body& body : solver.bodies())
-            for (std::size_t p = 0; p < body.points.count; ++p)
-                if (const double X = body.points.X[p], Y = body.points.Y[p]; where({.X = X, .Y = Y, .x = X, .y = Y}) != 0)
-                    probe.ids.push_back(body.points.id[p]);
+        for (std::uint32_t id = 0; id < initial.size(); ++id)
+            if (const Vec2& X = initial[id]; where({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]}) != 0)
+            {
+                probe.ids.push_back(id);
+                probe.initial.push_back(X);
+            }
         if (probe.ids.empty())
             throw SceneError(fmt::format("{}: probe '{}': where = \"{}\" holds at no point", scene.path, spec.name, spec.where));
-        std::sort(probe.ids.begin(), probe.ids.end());
         probe.series = {{"displacement", "m", 3}, {"velocity", "m/s", 3}, {"stress", "Pa", 6}};
         if (!exact_.displacement.empty())
             probe.series.push_back({"exact_displacement", "m", 3});
@@ -94,10 +111,10 @@ std::vector<Observer::Location> Observer::locations() const
     return where;
 }
 
-Place Observer::place(const Location& at, double t) const
+Place Observer::place(const Location& at, const Vec2& initial, double t) const
 {
     const Points& q = solver_.bodies()[at.body].points;
-    return {q.X[at.point], q.Y[at.point], q.x[at.point], q.y[at.point], t};
+    return {initial[0], initial[1], q.x[at.point], q.y[at.point], t};
 }
 
 std::array<double, 6> Observer::stress(const Location& at) const
@@ -149,10 +166,10 @@ void Observer::sample_probes(double t)
         std::vector<std::vector<double>> mean;
         for (const Series& s : probe.series)
             mean.emplace_back(s.columns, 0.0);
-        for (const std::uint32_t id : probe.ids)
+        for (std::size_t n = 0; n < probe.ids.size(); ++n)
         {
-            const Location at = where[id];
-            const Place here = place(at, t);
+            const Location at = where[probe.ids[n]];
+            const Place here = place(at, probe.initial[n], t);
             const Vec2 v = solver_.velocity(at.body, at.point);
             const auto add = [&](std::size_t k, const auto& values) {
                 for (std::size_t c = 0; c < values.size(); ++c)
@@ -181,6 +198,7 @@ double Observer::kinetic_ratio(const Solver& solver)
 void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
 {
     const std::vector<Location> where = locations();
+    const std::vector<Vec2> initial = initial_positions(scene_);
     const std::string group = fmt::format("/snapshots/{:04}", snapshot_times_.size());
     file.attribute(group, "time", t);
     file.attribute(group, "step", step);
@@ -188,9 +206,9 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     const auto write = [&](const char* name, const char* unit, std::size_t columns, auto&& row_of) {
         std::vector<double> values;
         values.reserve(where.size() * columns);
-        for (const Location& at : where)
+        for (std::size_t n = 0; n < where.size(); ++n)
         {
-            const auto row = row_of(at);
+            const auto row = row_of(where[n], place(where[n], initial[n], t));
             values.insert(values.end(), row.begin(), row.end());
         }
         file.dataset(group + "/" + name, unit, values, columns);
@@ -198,19 +216,21 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     };
     using Row1 = std::array<double, 1>;
     using Row3 = std::array<double, 3>;
-    const auto points = [&](const Location& at) -> const Points& { return solver_.bodies()[at.body].points; };
-    write("position", "m", 3, [&](const Location& at) { const Place x = place(at, t); return Row3{x.x, x.y, 0}; });
-    write("initial_position", "m", 3, [&](const Location& at) { const Place x = place(at, t); return Row3{x.X, x.Y, 0}; });
-    write("displacement", "m", 3, [&](const Location& at) { const Place x = place(at, t); return Row3{x.x - x.X, x.y - x.Y, 0}; });
-    write("velocity", "m/s", 3, [&](const Location& at) { const Vec2 v = solver_.velocity(at.body, at.point); return Row3{v[0], v[1], 0}; });
-    write("stress", "Pa", 6, [&](const Location& at) { return stress(at); });
-    write("volume", "m^2", 1, [&](const Location& at) { return Row1{points(at).current_volume(at.point)}; });
-    write("initial_volume", "m^2", 1, [&](const Location& at) { return Row1{points(at).initial_volume}; });
-    write("mass", "kg/m", 1, [&](const Location& at) { return Row1{points(at).mass}; });
+    using At = const Location&;
+    using Here = const Place&;
+    const auto points = [&](At at) -> const Points& { return solver_.bodies()[at.body].points; };
+    write("position", "m", 3, [](At, Here p) { return Row3{p.x, p.y, 0}; });
+    write("initial_position", "m", 3, [](At, Here p) { return Row3{p.X, p.Y, 0}; });
+    write("displacement", "m", 3, [](At, Here p) { return Row3{p.x - p.X, p.y - p.Y, 0}; });
+    write("velocity", "m/s", 3, [&](At at, Here) { const Vec2 v = solver_.velocity(at.body, at.point); return Row3{v[0], v[1], 0}; });
+    write("stress", "Pa", 6, [&](At at, Here) { return stress(at); });
+    write("volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).current_volume(at.point)}; });
+    write("initial_volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).initial_volume}; });
+    write("mass", "kg/m", 1, [&](At at, Here) { return Row1{points(at).mass}; });
     if (!exact_.displacement.empty())
-        write("exact_displacement", "m", 3, [&](const Location& at) { return exact_displacement(place(at, t)); });
+        write("exact_displacement", "m", 3, [&](At, Here p) { return exact_displacement(p); });
     if (!exact_.stress.empty())
-        write("exact_stress", "Pa", 6, [&](const Location& at) { return exact_stress(place(at, t)); });
+        write("exact_stress", "Pa", 6, [&](At, Here p) { return exact_stress(p); });
     std::vector<std::uint32_t> id(where.size()), body(where.size());
     for (std::uint32_t n = 0; n < where.size(); ++n)
     {

@@ -35,6 +35,7 @@ private:
     {
         std::string name;
         std::vector<std::uint32_t> ids{};
+        std::vector<Vec2> initial{};
         std::vector<Series> series{};
     };
     struct Exact
@@ -47,7 +48,7 @@ private:
     };
 
     std::vector<Location> locations() const;
-    Place place(const Location& at, double t) const;
+    Place place(const Location& at, const Vec2& initial, double t) const;
     std::array<double, 6> stress(const Location& at) const;
     std::array<double, 6> exact_stress(const Place& at) const;
     std::array<double, 3> exact_displacement(const Place& at) const;
@@ -62,6 +63,6 @@ private:
     std::vector<double> snapshot_times_;
     std::vector<std::string> snapshot_fields_;
     double gravity_work_ = 0, last_time_ = 0;
-    Vec2 last_moment_{0, 0};
+    Vec2 last_moment_;
 };
 }  // namespace testbed

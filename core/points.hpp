@@ -9,7 +9,7 @@ namespace testbed
 struct Points
 {
     Field<double> x{"x", "m"}, y{"y", "m"};                          ///< current position
-    Field<double> X{"X", "m"}, Y{"Y", "m"};                          ///< initial position
+    Field<double> X{"X", "m"}, Y{"Y", "m"};                          ///< initial position, if a step needs it; else see the id
     Field<double> sxx{"stress_xx", "Pa"}, syy{"stress_yy", "Pa"}, sxy{"stress_xy", "Pa"};
     Field<double> volume{"volume", "m^2"};                           ///< current, per metre of thickness
     Field<double> half_x{"half_width_x", "m"}, half_y{"half_width_y", "m"};  ///< the point's own box, if it has one

@@ -64,9 +64,10 @@ struct Outcome
 /// Steps from 0 to the end; the history and the snapshots go to the observer.
 Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, ResultFile& file, bool quiet)
 {
+    const Stopwatch watch;
     Outcome out;
     const double end = scene.time.end;
-    out.dt = solver.is_static() ? end : time_step(scene);
+    out.dt = solver.is_static() ? end : scene.time.dt ? *scene.time.dt : scene.time.cfl * solver.critical_time_step(scene);
     const auto total_steps = static_cast<std::int64_t>(std::ceil(end / out.dt * (1 - 1e-12)));
     if (!scene.time.dt)
         out.dt = end / static_cast<double>(total_steps);
@@ -75,15 +76,17 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
     const double half = 0.5 * out.dt;
     double next_sample = 0, next_snapshot = 0, t = 0;
     Progress progress(!quiet, end);
-    const Stopwatch watch;
     const auto record = [&](bool last) {
         const Stopwatch output;
-        if (t + half >= next_sample || last)
+        const bool sample = t + half >= next_sample || last, snapshot = t + half >= next_snapshot || last;
+        if (sample || snapshot)
+            solver.update_points();
+        if (sample)
         {
             observer.sample(t);
             next_sample += history_interval;
         }
-        if (t + half >= next_snapshot || last)
+        if (snapshot)
         {
             observer.snapshot(file, t, out.steps);
             next_snapshot += snapshot_interval;
@@ -92,6 +95,7 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
     };
     const auto is_at_rest = [&] {
         const double tolerance = *scene.time.stop_unbalanced;
+        solver.update_points();
         return solver.sums().unbalanced < tolerance && Observer::kinetic_ratio(solver) < tolerance &&
                (!scene.gravity || t >= scene.gravity->ramp);
     };
@@ -182,7 +186,7 @@ void write_performance(ResultFile& file, const Scene& scene, Solver& solver, con
     file.attribute(group, "cells", static_cast<std::int64_t>(solver.active_cells()));
     file.attribute(group, "dofs", static_cast<std::int64_t>(solver.unknowns()));
     file.attribute(group, "dt", out.dt);
-    file.attribute(group, "dt_critical", critical_time_step(scene));
+    file.attribute(group, "dt_critical", solver.critical_time_step(scene));
     for (const auto& [phase, seconds] : solver.timer().phases())
         file.attribute(group + "/phases", phase, seconds);
 }
@@ -268,7 +272,7 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
         throw OutputError(fmt::format("cannot write '{}'", xdmf_path.string()));
 
     if (!options.quiet)
-        fmt::print(stderr, "{} {}: {}{}{}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.0f} bytes per point; {}\n",
+        fmt::print(stderr, "{} {}: {}{}{}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.1f} bytes per point; {}\n",
                    scene.case_name(), variant_label(scene), out.status, out.reason.empty() ? "" : ": ", out.reason, points, out.steps, out.dt,
                    out.solve_seconds, 1e-6 * static_cast<double>(points) * static_cast<double>(out.steps) / out.solve_seconds,
                    static_cast<double>(solver->bytes()) / static_cast<double>(points), output);

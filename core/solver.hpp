@@ -2,6 +2,7 @@
 /// What the run loop knows of a method: the one boundary of type erasure, crossed a few times per step.
 
 #include "core/body.hpp"
+#include "core/method_limits.hpp"
 #include "core/node_ops.hpp"
 #include "core/phase_timer.hpp"
 
@@ -54,6 +55,8 @@ public:
     /// The state from t to t + dt. @throws Diverged
     virtual void advance(double dt) = 0;
 
+    /// Brings the points of bodies() to the state of the last prepare(): for methods whose points are samples, not unknowns.
+    virtual void update_points() {}
     virtual const std::vector<Body>& bodies() const = 0;
     /// Velocity of a point, at the half step before the last prepare().
     virtual Vec2 velocity(std::size_t body, std::size_t point) const = 0;
@@ -62,6 +65,8 @@ public:
     virtual std::size_t bytes() = 0;                ///< of all arrays
     virtual const PhaseTimer& timer() const = 0;
     virtual const char* kinematics() const = 0;     ///< which [exact.*] applies
+    /// What time.cfl is a share of: the stability limit, or for an implicit method what it would be about [s].
+    virtual double critical_time_step(const Scene& scene) { return testbed::critical_time_step(scene); }
     /// One implicit step to the end instead of many explicit ones.
     virtual bool is_static() const { return false; }
 };

@@ -20,7 +20,7 @@ public:
     explicit Lpfdm(const Scene& scene)
         : lattice_(make_lattice(scene.grid)),
           near_(lattice_),
-          bodies_(make_bodies(scene, lattice_, {.box = Support::has_box})),
+          bodies_(make_bodies(scene, lattice_, {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
           node_ops_(make_node_ops(scene, lattice_)),
           cells_(lattice_.cells()),
           nodes_(lattice_.nodes()),
@@ -105,7 +105,7 @@ public:
     std::size_t bytes() override
     {
         return bytes_of(bodies_) + cells_.bytes() + nodes_.bytes() + gather_.bytes() + was_active_.capacity() +
-               partial_.capacity() * sizeof(double) + (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) +
+               workspace_.capacity() * sizeof(double) + (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) +
                (first_cell_.capacity() + left_.capacity()) * sizeof(std::uint32_t) + (body_force_ ? body_force_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
@@ -120,13 +120,13 @@ private:
         std::vector<const Bins*> bins;
         for (Body& body : bodies_)
         {
-            body.bins.template rebuild<Support::has_box>(body.points);
+            body.bins.template rebuild<Support::has_box>(body.points, workspace_);
             bins.push_back(&body.bins);
         }
         for (const auto c : gather_.active())
             cells_.clear(c);
         gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.cell(i, j); });
-        partial_.assign(gather_.blocks() * 4, 0.0);
+        make_room(workspace_, gather_.blocks() * 4);
         find_active_nodes();
         moved_ = false;
     }
@@ -140,6 +140,7 @@ private:
                 nodes_.active.push_back(static_cast<std::uint32_t>(near_.corner(lattice_.node(lattice_.cell_i(c), lattice_.cell_j(c)), k)));
         std::sort(nodes_.active.begin(), nodes_.active.end());
         nodes_.active.erase(std::unique(nodes_.active.begin(), nodes_.active.end()), nodes_.active.end());
+        nodes_.active.shrink_to_fit();
         std::set_difference(before.begin(), before.end(), nodes_.active.begin(), nodes_.active.end(), std::back_inserter(left_));
         first_cell_.resize(nodes_.active.size());
         for (std::size_t a = 0; a < nodes_.active.size(); ++a)
@@ -153,14 +154,14 @@ private:
         for (const Body& body : bodies_)
         {
             const Points& q = body.points;
-            spread<Support, 4>(lattice_, body, first_bin, partial_, [&](std::size_t p, const auto& lanes) {
+            spread<Support, 4>(lattice_, body, first_bin, workspace_, [&](std::size_t p, const auto& lanes) {
                 const Pack v = volume<Support>(q, p, lanes);
                 return std::array<Pack, 4>{Pack(q.mass), v * lanes.load(&q.sxx[p]), v * lanes.load(&q.syy[p]), v * lanes.load(&q.sxy[p])};
             });
             first_bin += body.bins.list().size();
         }
         const double area = lattice_.cell_size * lattice_.cell_size;
-        gather_.sum<4>(partial_, [&](std::size_t c, const std::array<double, 4>& s) {
+        gather_.sum<4>(workspace_, [&](std::size_t c, const std::array<double, 4>& s) {
             cells_.mass[c] = s[0];
             cells_.stress[c] = {s[1] / area, s[2] / area, s[3] / area};
         });
@@ -430,7 +431,7 @@ private:
                     {
                         const std::size_t n = near_.corner(lattice_.node(bin.i + k % S, bin.j + k / S), corner);
                         const Vec2 x = lattice_.node_position(n);
-                        const double m = 0.25 * partial_[block * 4];
+                        const double m = 0.25 * workspace_[block * 4];
                         mass[n] += m;
                         if (!velocity)
                             continue;
@@ -457,7 +458,7 @@ private:
     std::vector<std::uint32_t> first_cell_, left_;
     Gather gather_;
     LpfdmSpec options_;
-    std::vector<double> partial_;
+    std::vector<double> workspace_;  ///< sums of bins, and the way of a field to its new order
     std::vector<Vec2> hourglass_, cell_force_;  ///< empty unless the scene has them
     std::optional<BodyForce> body_force_;
     PhaseTimer timer_;

@@ -17,7 +17,7 @@ class Mpm final : public Solver
 public:
     explicit Mpm(const Scene& scene)
         : lattice_(make_lattice(scene.grid)),
-          bodies_(make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true})),
+          bodies_(make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true, .initial_position = scene.body_force.has_value()})),
           node_ops_(make_node_ops(scene, lattice_)),
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
@@ -88,7 +88,7 @@ public:
     std::size_t bytes() override
     {
         return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() +
-               (partial_.capacity() + carrier_x_.capacity() + carrier_y_.capacity()) * sizeof(double) + (body_force_ ? body_force_->bytes() : 0);
+               (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity()) * sizeof(double) + (body_force_ ? body_force_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
     const char* kinematics() const override { return "hypoelastic"; }
@@ -101,7 +101,7 @@ private:
         std::vector<const Bins*> bins;
         for (Body& body : bodies_)
         {
-            body.bins.template rebuild<Shape::has_box>(body.points);
+            body.bins.template rebuild<Shape::has_box>(body.points, workspace_);
             bins.push_back(&body.bins);
         }
         gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
@@ -114,14 +114,14 @@ private:
     void points_to_nodes()
     {
         constexpr std::size_t Q = sums_of<what>;
-        partial_.resize(gather_.blocks() * Q);
+        make_room(workspace_, gather_.blocks() * Q);
         std::size_t first_bin = 0;
         for (const Body& body : bodies_)
         {
-            scatter<Shape, Strain, what>(lattice_, body, first_bin, partial_);
+            scatter<Shape, Strain, what>(lattice_, body, first_bin, workspace_);
             first_bin += body.bins.list().size();
         }
-        gather_.sum<Q>(partial_, [&](std::size_t i, const std::array<double, Q>& s) {
+        gather_.sum<Q>(workspace_, [&](std::size_t i, const std::array<double, Q>& s) {
             if constexpr (what != Scatter::force)
             {
                 nodes_.mass[i] = s[0];
@@ -236,7 +236,8 @@ private:
     Nodes nodes_;
     Gather gather_;
     MpmSpec options_;
-    std::vector<double> partial_, carrier_x_, carrier_y_;
+    std::vector<double> workspace_;  ///< sums of bins, and the way of a field to its new order
+    std::vector<double> carrier_x_, carrier_y_;
     std::optional<BodyForce> body_force_;
     PhaseTimer timer_;
     double internal_ = 0, lag_ = 0;

@@ -1,0 +1,111 @@
+#pragma once
+/// Small-strain plane-strain elasticity on the mesh of a scene: K u + M a = f(t), per metre of thickness.
+
+#include "core/body.hpp"
+#include "core/node_ops.hpp"
+#include "core/solver.hpp"
+#include "fem_reference/mesh.hpp"
+
+#include <deal.II/dofs/dof_handler.h>
+#include <deal.II/fe/fe_system.h>
+#include <deal.II/fe/fe_values.h>
+#include <deal.II/lac/affine_constraints.h>
+#include <deal.II/lac/full_matrix.h>
+#include <deal.II/lac/sparse_matrix.h>
+#include <deal.II/lac/vector.h>
+
+namespace testbed
+{
+using Matrix = dealii::SparseMatrix<double>;
+using Vector = dealii::Vector<double>;
+
+/// D : grad u. @param stiffness factor on the moduli
+inline SymTensor<> elastic_stress(const ElasticModuli& moduli, const Gradient<>& gradient, double stiffness = 1)
+{
+    const LinearElastic law{moduli};
+    LinearElastic::State<double> state;
+    law.update(state, gradient, stiffness);
+    return state.stress;
+}
+
+enum class MassKind
+{
+    none,
+    consistent,
+    lumped  ///< by Gauss-Lobatto quadrature in the nodes
+};
+
+class Elasticity
+{
+public:
+    /// Mesh, unknowns and supports; no matrices yet. @throws SceneError
+    Elasticity(const Scene& scene, const Lattice& lattice, const Warn& warn);
+
+    /// Stiffness, gravity and mass. @throws SceneError for a Young's modulus that is not positive
+    void assemble(MassKind mass_kind);
+
+    /// Without supports: the rows of held components give the reactions [N/m^2].
+    const Matrix& stiffness() const { return stiffness_; }
+    const Matrix& consistent_mass() const { return consistent_mass_; }  ///< [kg/m]
+    const Vector& lumped_mass() const { return lumped_mass_; }          ///< [kg/m]
+    /// Gravity and body force at time t, in the initial geometry [N/m].
+    Vector load(double t) const;
+    Vector initial_velocity() const;
+    /// Zero where a component is held.
+    void hold(Vector& field) const { constraints_.set_zero(field); }
+    /// stiffness K + mass M, with nothing but the diagonal in rows and columns where a component is held.
+    void combine(double stiffness, double mass, Matrix& result) const;
+
+    /// Kinetic energy and momenta of a velocity field; the arms are initial positions.
+    MotionSums motion(const Vector& velocity) const;
+    /// Largest angular frequency of the lumped system, held components left out [rad/s].
+    double largest_frequency() const;
+    /// @throws SceneError if a part of the mesh can move as a rigid body
+    void check_supports() const;
+
+    const dealii::DoFHandler<2>& dofs() const { return dofs_; }
+    const std::vector<dealii::Point<2>>& nodes() const { return nodes_; }  ///< of each degree of freedom [m]
+    bool is_x(std::size_t dof) const { return component_[dof] == 0; }
+    bool is_held(std::size_t dof) const { return constraints_.is_constrained(dof); }
+    std::size_t unknowns() const { return dofs_.n_dofs() - constraints_.n_constraints(); }
+    std::size_t cells() const { return mesh_.n_active_cells(); }
+    std::size_t bytes() const;
+
+private:
+    /// What the assembly asks of a body.
+    struct Medium
+    {
+        double density;
+        ElasticModuli moduli;
+        Expression youngs_modulus;
+        bool varies;
+        std::optional<VectorExpression> velocity;
+    };
+    /// Of a cell with unit density.
+    struct CellMass
+    {
+        dealii::FullMatrix<double> consistent;
+        std::vector<double> share, lumped;  ///< integrals of the shape functions by Gauss and by Gauss-Lobatto quadrature
+    };
+    void read_media();
+    void find_supports(const Warn& warn);
+    void make_sparsity();
+    double stiffness_ratio(const Medium& medium, const dealii::Point<2>& X) const;
+    dealii::FullMatrix<double> cell_stiffness(const Medium& medium, const dealii::FEValues<2>& values) const;
+    CellMass cell_mass() const;
+    void add_body_force(double t, Vector& force) const;
+
+    const Scene& scene_;
+    dealii::Triangulation<2> mesh_;
+    dealii::FESystem<2> element_;
+    dealii::DoFHandler<2> dofs_;
+    dealii::AffineConstraints<double> constraints_;
+    dealii::SparsityPattern sparsity_;
+    Matrix stiffness_, consistent_mass_;
+    Vector lumped_mass_, weight_;  ///< weight: of the full gravity
+    std::vector<Medium> media_;
+    std::optional<VectorExpression> body_force_;
+    std::vector<dealii::Point<2>> nodes_;
+    std::vector<unsigned char> component_;
+};
+}  // namespace testbed
