@@ -1,5 +1,6 @@
 #include "fem_reference/mesh.hpp"
 
+#include "core/body.hpp"
 #include "core/geometry.hpp"
 
 #include <algorithm>

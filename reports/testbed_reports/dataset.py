@@ -82,7 +82,7 @@ def read_run(folder, entry):
         return run
     try:
         result = Result(path)
-        values.update(method=result.method, variant=result.variant, L=result.cell_size,
+        values.update(case=result.case, method=result.method, variant=result.variant, L=result.cell_size,
                       ppc=result.scene.get("points_per_cell", ""), dt=result.performance.get("dt", ""),
                       seed=result.seed)
     except ResultError as error:

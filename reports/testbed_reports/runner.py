@@ -19,7 +19,6 @@ class Task:
     id: str
     folder: Path
     command: list
-    threads: int
 
 
 @dataclass
@@ -56,10 +55,8 @@ def _start(task):
     task.folder.mkdir(parents=True, exist_ok=True)
     for name in ("result.h5", "result.h5.part"):
         (task.folder / name).unlink(missing_ok=True)
-    environment = {**os.environ, "OMP_NUM_THREADS": str(task.threads)}
     with open(task.folder / "log.txt", "wb") as log:
-        return subprocess.Popen(task.command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
-                                env=environment, start_new_session=True, preexec_fn=_die_with_parent)
+        return subprocess.Popen(task.command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=_die_with_parent)
 
 
 def _judge(task, code, seconds):

@@ -55,7 +55,9 @@ def readable(method, axes, repeat):
     """'lpfdm_L0.5_r1': what a run is, as a folder's name."""
     parts = [method]
     for key, value in axes.items():
-        if key != "method":
+        if key == "scene":
+            parts.insert(0, Path(value).parent.name)
+        elif key != "method":
             short = {"grid.cell_size": "L"}.get(key, key.rsplit(".", 1)[-1])
             text = f"{value:g}" if isinstance(value, float) else toml_value(value)
             parts.append(short + text)
@@ -63,9 +65,9 @@ def readable(method, axes, repeat):
     return re.sub(r"[^\w.+=-]+", "", "_".join(parts))[:120]
 
 
-def run_arguments(scene, combination):
+def run_arguments(combination):
     """Arguments that choose scene, method and settings, for `run` and `check` alike."""
-    arguments = [str(scene)]
+    arguments = [str(combination.scene)]
     if combination.method:
         arguments += ["--method", combination.method]
     for key, value in combination.sets.items():
@@ -73,50 +75,44 @@ def run_arguments(scene, combination):
     return arguments
 
 
-def resolve(testbed, scene, combination):
+def resolve(testbed, combination):
     """The resolved scene of a combination as TOML text."""
-    done = subprocess.run([str(testbed), "check", *run_arguments(scene, combination), "--resolved"],
+    done = subprocess.run([str(testbed), "check", *run_arguments(combination), "--resolved"],
                           stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
     if done.returncode != 0:
         told = (done.stderr.strip() or done.stdout.strip() or f"exit code {done.returncode}")
-        raise StudyError(f"{scene}: refused by 'testbed check' "
-                         f"({shlex.join(run_arguments(scene, combination)[1:])}):\n{told}")
+        raise StudyError(f"{combination.scene}: refused by 'testbed check' "
+                         f"({shlex.join(run_arguments(combination)[1:])}):\n{told}")
     try:
         return done.stdout, tomllib.loads(done.stdout)
     except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"{scene}: 'testbed check --resolved' did not print TOML: {error}") from error
+        raise StudyError(f"{combination.scene}: 'testbed check --resolved' did not print TOML: {error}") from error
 
 
-def _first(table, *names):
-    """table[a][b]... or None."""
-    for name in names:
-        if isinstance(table, list):
-            table = table[0] if table else {}
-        table = table.get(name) if isinstance(table, dict) else None
-    return table
+def method_of(scene):
+    """The method that a scene file names, '' if none."""
+    try:
+        return str(tomllib.loads(scene.read_text(encoding="utf-8")).get("method", ""))
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise StudyError(f"{scene}: {error}") from error
 
 
 def expand(study, testbed, folder, keep, jobs):
     """(plan, tasks): every run of the study with its id, and those that are not finished."""
-    scene_method = ""
-    try:
-        scene_method = str(tomllib.loads(study.scene.read_text(encoding="utf-8")).get("method", ""))
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise StudyError(f"{study.scene}: {error}") from error
     fem = testbed.with_name("testbed-fem")
     binaries = {False: testbed.read_bytes(), True: fem.read_bytes() if fem.is_file() else None}
     hashes = {key: digest(data, length=4) for key, data in binaries.items() if data is not None}
 
     chosen, left_out = [], []
     for combination in study.combinations:
-        method = combination.method or scene_method
+        method = combination.method or method_of(combination.scene)
         if is_fem(method) and binaries[True] is None:
             left_out.append({"axes": combination.axes, "variant": method, "method": "fem",
                              "L": combination.axes.get("grid.cell_size"), "reason": FEM_MISSING})
         else:
             chosen.append((combination, method))
     with concurrent.futures.ThreadPoolExecutor(max(1, jobs)) as pool:
-        futures = [pool.submit(resolve, testbed, study.scene, c) for c, _ in chosen]
+        futures = [pool.submit(resolve, testbed, c) for c, _ in chosen]
         scenes, problems = [], []
         for future in futures:
             try:
@@ -128,27 +124,22 @@ def expand(study, testbed, folder, keep, jobs):
 
     entries, tasks = [], []
     for (combination, method), (text, resolved) in zip(chosen, scenes):
-        threads = combination.threads
-        for key in ("threads", "parallel", "run"):
-            value = _first(resolved, key) if key == "threads" else _first(resolved, key, "threads")
-            if isinstance(value, int) and value > 0:
-                threads = value
         for repeat in range(1, study.repeats + 1):
             name = readable(method, combination.axes, repeat)
-            stem = f"{name}_{digest(text, repeat, threads)}"
+            stem = f"{name}_{digest(text, repeat, combination.threads)}"
             run_id = f"{stem}-{hashes[is_fem(method)]}"
             runs = folder / "runs"
             if keep and not is_finished(runs / run_id / "result.h5"):
                 old = [p for p in runs.glob(f"{stem}-*") if is_finished(p / "result.h5")]
                 if old:
                     run_id = max(old, key=lambda p: p.stat().st_mtime).name
-            entries.append({"id": run_id, "variant": method, "L": _first(resolved, "grid", "cell_size"),
+            entries.append({"id": run_id, "variant": method, "L": resolved.get("grid", {}).get("cell_size"),
                             "axes": combination.axes, "repeat": repeat, "outcome": ""})
             out = runs / run_id
             if not is_finished(out / "result.h5"):
-                command = [str(testbed), "run", *run_arguments(study.scene, combination), "-o",
-                           str(out / "result.h5"), "--quiet"]
-                tasks.append(Task(run_id, out, command, threads))
+                command = [str(testbed), "run", *run_arguments(combination), "--threads", str(combination.threads),
+                           "-o", str(out / "result.h5"), "--quiet"]
+                tasks.append(Task(run_id, out, command))
     ids = [e["id"] for e in entries]
     twice = next((i for i in ids if ids.count(i) > 1), None)
     if twice:

@@ -19,7 +19,7 @@ STUDY_KEYS = {"title": TEXT, "purpose": TEXT, "scene": TEXT, "repeats": (int,), 
               "axes": TABLE, "exclude": LIST, "override": LIST, "target": LIST, "figure": LIST}
 
 # What a `where` may choose runs by, besides the axes of the study.
-COLUMNS = ("method", "variant", "L", "ppc", "dt", "seed", "repeat")
+COLUMNS = ("case", "method", "variant", "L", "ppc", "dt", "seed", "repeat")
 
 TARGET_KEYS = {"label": TEXT, "quantity": TEXT, "norm": TEXT, "where": TABLE, "kind": TEXT, "value": NUMBER,
                "low": NUMBER, "high": NUMBER, "L_from": NUMBER, "L_to": NUMBER, "source": TEXT}
@@ -52,6 +52,7 @@ class Combination:
     """One member of the product of the axes: what it sets, before repeats."""
     axes: dict
     sets: dict
+    scene: Path
     method: str | None
     threads: int
 
@@ -62,7 +63,6 @@ class StudyFile:
     path: Path
     title: str
     purpose: str
-    scene: Path
     repeats: int
     combinations: list
     targets: list = field(default_factory=list)
@@ -191,12 +191,16 @@ def read_study(path, need_scene=True):
     reader = _Reader(path)
     data, fail = reader.data, reader.fail
     reader.check(data, STUDY_KEYS)
-    for key in ("title", "scene"):
-        if key not in data:
-            raise StudyError(f"{path}: lacks the key '{key}'")
-    scene = reader.path.parent / data["scene"]
-    if need_scene and not scene.is_file():
-        fail(f"'scene': no such file: {data['scene']}", "scene")
+    if "title" not in data:
+        raise StudyError(f"{path}: lacks the key 'title'")
+    scenes = data.get("axes", {}).get("scene", [data["scene"]] if "scene" in data else [])
+    if not scenes:
+        raise StudyError(f"{path}: lacks the key 'scene' (or an axis 'scene')")
+    if "scene" in data and "scene" in data.get("axes", {}):
+        fail("'scene' is given and is an axis, too", "scene")
+    for name in scenes if isinstance(scenes, list) else []:
+        if not isinstance(name, str) or need_scene and not (reader.path.parent / name).is_file():
+            fail(f"'scene': no such file: {name}", "scene", "" if "scene" in data else "axes")
     for key, least in (("repeats", 1), ("threads", 1)):
         if data.get(key, least) < least:
             fail(f"'{key}' must be at least {least}", key)
@@ -242,14 +246,15 @@ def read_study(path, need_scene=True):
         if out:
             continue
         combined = dict(sets)
-        combined.update({k: v for k, v in chosen.items() if k not in ("method", "threads")})
+        combined.update({k: v for k, v in chosen.items() if k not in ("scene", "method", "threads")})
         for i, (when, changes) in enumerate(overrides):
             if matches(chosen, when):
                 overridden[i] += 1
                 combined.update(changes)
         method = combined.pop("method", None)
         threads = combined.pop("threads", data.get("threads", 1))
-        combinations.append(Combination(chosen, combined, chosen.get("method", method),
+        scene = reader.path.parent / chosen.get("scene", scenes[0])
+        combinations.append(Combination(chosen, combined, scene, chosen.get("method", method),
                                         chosen.get("threads", threads)))
     for i in range(len(excludes)):
         if not excluded[i]:
@@ -299,5 +304,5 @@ def read_study(path, need_scene=True):
                      "series", "figure", index)
         figures.append({**entry, "series": series, "where": check_where(entry, "figure", index)})
 
-    return StudyFile(reader.path, data["title"], data.get("purpose", ""), scene, data.get("repeats", 1),
+    return StudyFile(reader.path, data["title"], data.get("purpose", ""), data.get("repeats", 1),
                      combinations, targets, figures)

@@ -174,7 +174,7 @@ if command == "check":
     print("\\n".join('[set."%s"]\\nvalue = %s' % item for item in sets.items()))
     sys.exit(0)
 with open(here / "calls.txt", "a") as calls:
-    calls.write(json.dumps([method, L, sets, os.environ.get("OMP_NUM_THREADS")]) + "\\n")
+    calls.write(json.dumps([method, L, sets, option("--threads")]) + "\\n")
 behaviour = json.loads((here / "behave.json").read_text()) if (here / "behave.json").exists() else {{}}
 what = behaviour.get(method, "")
 out = Path(option("-o"))
