@@ -376,8 +376,9 @@ void Elasticity::check_supports() const
         }
         const auto stiffness = dealii::eigenvalues(gram);  // descending
         if (!(stiffness[2] > 1e-12 * stiffness[0]))
-            throw SceneError(fmt::format("{}: body '{}' can move as a rigid body, and a static analysis has no unique solution; add [[boundary]] "
-                                         "entries that stop it in x, in y and from turning, or set fem.analysis = \"dynamic\"",
+            throw SceneError(fmt::format("{}: body '{}' can move as a rigid body, and a static analysis has no unique solution; add "
+                                         "[[boundary]] entries that stop it in x, in y and from turning, or set fem.analysis = "
+                                         "\"dynamic\"",
                                          scene_.path, scene_.bodies[body].name));
     }
 }

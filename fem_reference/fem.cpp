@@ -258,8 +258,8 @@ private:
     void check(double dt)
     {
         if (const double limit = stable_time_step(); dt > limit * (1 + 1e-6))
-            throw SceneError(fmt::format("{}: the time step {:.6g} s is above the limit of central differences on this mesh, {:.6g} s; lower "
-                                         "time.dt (or time.cfl to 1 or less), or set fem.integrator = \"newmark\"",
+            throw SceneError(fmt::format("{}: the time step {:.6g} s is above the limit of central differences on this mesh, {:.6g} s; "
+                                         "lower time.dt (or time.cfl to 1 or less), or set fem.integrator = \"newmark\"",
                                          path_, dt, limit));
         checked_dt_ = dt;
     }
@@ -270,7 +270,8 @@ private:
 
 std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
 {
-    dealii::MultithreadInfo::set_thread_limit(static_cast<unsigned int>(threads()));
+    // the triangular solves are serial and dominate; threads in deal.II would only change the order of sums
+    dealii::MultithreadInfo::set_thread_limit(1);
     const Warn say = warn ? warn : [](const std::string& message) { fmt::print(stderr, "warning: {}\n", message); };
     const bool damped = scene.damping && scene.damping->local > 0;
     const bool ramped = scene.gravity && scene.gravity->ramp > 0;
@@ -278,8 +279,8 @@ std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
     if (analysis == "static" || (analysis == "auto" && (damped || ramped || scene.time.stop_unbalanced)))
         return std::make_unique<StaticFem>(scene, say);
     if (damped)
-        throw SceneError(fmt::format("{}: fem.analysis = \"dynamic\" has no local damping; take the damping out (--set damping.local=0), or set "
-                                     "fem.analysis = \"static\" for the state at rest",
+        throw SceneError(fmt::format("{}: fem.analysis = \"dynamic\" has no local damping; take the damping out (--set damping.local=0), "
+                                     "or set fem.analysis = \"static\" for the state at rest",
                                      scene.path));
     if (scene.fem.integrator == "central_difference")
         return std::make_unique<CentralDifferenceFem>(scene, say);

@@ -1,6 +1,7 @@
 #pragma once
 /// Finite element reference: small-strain elasticity on the lattice cells of a scene, static (one linear solve) or dynamic
-/// (Newmark's average acceleration, or central differences with lumped mass).
+/// (Newmark's average acceleration, or central differences with lumped mass). Every material law is taken as linear elastic; points
+/// and loads keep their initial geometry, so that turns of more than a few degrees, contact and damping are beyond it.
 
 #include "fem_reference/sampler.hpp"
 

@@ -22,7 +22,8 @@ int run(int argc, char** argv)
     return static_cast<int>(run_scene(options, [&](const Scene& scene) {
         if (find_variant(scene.method).family != "fem")
             throw SceneError(scene.path + ": method '" + scene.method + "' is not an FEM one; add --method fem-q2");
-        return make_fem(scene, options.strict ? Warn([&](const std::string& message) { throw SceneError(scene.path + ": " + message); }) : Warn());
+        const auto refuse = [&](const std::string& message) { throw SceneError(scene.path + ": " + message); };
+        return make_fem(scene, options.strict ? Warn(refuse) : Warn());
     }));
 }
 }  // namespace

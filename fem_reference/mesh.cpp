@@ -22,8 +22,9 @@ void check_box_on_lattice(const Scene& scene, const BodySpec& body, const Lattic
         {
             const double cells = (corner[k] - lattice.origin[k]) / lattice.cell_size;
             if (std::abs(cells - std::round(cells)) > 1e-6)
-                throw SceneError(fmt::format("{}: body '{}': its corner ({}, {}) m is off the lines of the FEM mesh, which start at the corner of "
-                                             "the first box and are grid.cell_size = {} m apart; move the corner or change the cell size",
+                throw SceneError(fmt::format("{}: body '{}': its corner ({}, {}) m is off the lines of the FEM mesh, which start "
+                                             "at the corner of the first box and are grid.cell_size = {} m apart; move the corner or "
+                                             "change the cell size",
                                              scene.path, body.name, corner[0], corner[1], lattice.cell_size));
         }
 }
@@ -54,7 +55,8 @@ std::vector<Cell> covered_cells(const Scene& scene, const BodySpec& body, const 
         cells.emplace_back(j, i);
     }
     if (cells.empty())
-        throw SceneError(fmt::format("{}: body '{}' holds the centre of no lattice cell; make grid.cell_size smaller", scene.path, body.name));
+        throw SceneError(fmt::format("{}: body '{}' holds the centre of no lattice cell; make grid.cell_size smaller", scene.path,
+                                     body.name));
     return cells;
 }
 
@@ -69,13 +71,14 @@ std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice& l
         const std::vector<Cell> cells = covered_cells(scene, body, lattice);
         for (const Cell& cell : cells)
             if (const auto [at, is_new] = owner.emplace(cell, b); !is_new)
-                throw SceneError(fmt::format("{}: body '{}' overlaps body '{}' in the lattice cell at ({}, {}) m; FEM cells belong to one body",
+                throw SceneError(fmt::format("{}: body '{}' overlaps body '{}' in the lattice cell at ({}, {}) m; FEM cells belong to one "
+                                             "body",
                                              scene.path, body.name, scene.bodies[at->second].name,
                                              lattice.origin[0] + cell.second * lattice.cell_size,
                                              lattice.origin[1] + cell.first * lattice.cell_size));
         if (body.shape != "box")
-            warn(fmt::format("body '{}': the FEM mesh is made of whole lattice cells, so its boundary is stepped and its area is {:.4g} m^2 "
-                             "instead of {:.4g} m^2",
+            warn(fmt::format("body '{}': the FEM mesh is made of whole lattice cells, so its boundary is stepped and its area is "
+                             "{:.4g} m^2 instead of {:.4g} m^2",
                              body.name, static_cast<double>(cells.size()) * lattice.cell_size * lattice.cell_size, area(body)));
     }
     return owner;

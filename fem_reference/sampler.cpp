@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <limits>
 
 namespace testbed
 {
@@ -19,8 +19,9 @@ Sampler::Sampler(const Scene& scene, const Lattice& lattice, const dealii::DoFHa
     for (const auto& active : dofs.active_cell_iterators())
     {
         const auto centre = active->center();
-        const int i = static_cast<int>((centre[0] - lattice.origin[0]) / cell_size_), j = static_cast<int>((centre[1] - lattice.origin[1]) / cell_size_);
-        cells_[static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i)] = {active->material_id(), true, number++};
+        const auto i = static_cast<std::size_t>((centre[0] - lattice.origin[0]) / cell_size_);
+        const auto j = static_cast<std::size_t>((centre[1] - lattice.origin[1]) / cell_size_);
+        cells_[j * static_cast<std::size_t>(nx_) + i] = {active->material_id(), true, number++};
         active->get_dof_indices(ids);
         for (unsigned int k = 0; k < shapes_; ++k)
             for (unsigned int c = 0; c < 2; ++c)
@@ -68,7 +69,8 @@ std::pair<int, int> Sampler::cell_of(const Vec2& place, unsigned int body) const
             {
                 if (const Cell& at = cell(i, j); !at.exists || at.body != body)
                     continue;
-                const double distance = std::hypot(place[0] - std::clamp(place[0], double(i), i + 1.0), place[1] - std::clamp(place[1], double(j), j + 1.0));
+                const double dx = place[0] - std::clamp<double>(place[0], i, i + 1), dy = place[1] - std::clamp<double>(place[1], j, j + 1);
+                const double distance = std::hypot(dx, dy);
                 if (distance < nearest)
                 {
                     nearest = distance;

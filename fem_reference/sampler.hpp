@@ -3,6 +3,8 @@
 
 #include "fem_reference/elasticity.hpp"
 
+#include <map>
+
 namespace testbed
 {
 class Sampler

@@ -13,12 +13,14 @@ struct UpwindConvection
     static Gradient<> gradient(const LpfdmGrid& grid, std::size_t first_cell, double cx, double cy)
     {
         const int k = (cx > 0 ? 1 : 0) + (cy > 0 ? 2 : 0);
-        return grid.cells.gradient[grid.around(first_cell, k)];
+        const std::size_t c = grid.around(first_cell, k);
+        return grid.cells.mass[c] > 0 ? grid.cells.gradient[c] : Gradient<>{};
     }
 };
 
-/// Mean of the cells around the node, weighted to the midpoint x_k - du/2 of the path. At rest this is the central
-/// difference; the shift is the Lax-Wendroff term that keeps it stable forward in time. Empty cells are left out.
+/// Mean of the cells around the node by their mass, weighted to the midpoint x_k - du/2 of the path. At rest this is the
+/// central difference; the shift is the Lax-Wendroff term that keeps it stable forward in time. Without the mass a sliver of a
+/// cell, such as a box makes that reaches over a wall by rounding, would count as much as a full one.
 struct CentralConvection
 {
     static Gradient<> gradient(const LpfdmGrid& grid, std::size_t first_cell, double cx, double cy)
@@ -28,9 +30,7 @@ struct CentralConvection
         for (int k = 0; k < 4; ++k)
         {
             const std::size_t c = grid.around(first_cell, k);
-            if (grid.cells.mass[c] == 0)
-                continue;
-            const double w = 0.25 * ((k & 1) ? 1 + cx : 1 - cx) * ((k & 2) ? 1 + cy : 1 - cy);
+            const double w = grid.cells.mass[c] * ((k & 1) ? 1 + cx : 1 - cx) * ((k & 2) ? 1 + cy : 1 - cy);
             const Gradient<>& g = grid.cells.gradient[c];
             mean = mean + Gradient<>{w * g.xx, w * g.yy, w * g.xy, w * g.yx};
             total += w;

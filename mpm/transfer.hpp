@@ -2,6 +2,7 @@
 /// Particle-to-node and node-to-particle kernels of MPM. A bin's nodes are the same for all its points, so their values are
 /// loaded once and their sums are kept in registers.
 
+#include "core/gather.hpp"
 #include "core/kinematics.hpp"
 #include "core/support.hpp"
 #include "mpm/shape.hpp"

@@ -1,0 +1,145 @@
+#include "core/gather.hpp"
+#include "tests/random.hpp"
+
+#include <gtest/gtest.h>
+#include <map>
+
+using namespace testbed;
+
+namespace
+{
+const Lattice lattice{{-1.0, 2.0}, 0.5, 6, 4};
+
+Points random_points(std::size_t n, unsigned seed)
+{
+    test::Random random(seed);
+    Points q;
+    q.count = n;
+    for (Field<double>* f : {&q.x, &q.y, &q.sxx, &q.half_x, &q.half_y})
+        f->activate(n, 0.05);
+    q.id.activate(n);
+    for (std::size_t p = 0; p < n; ++p)
+    {
+        q.x[p] = random(-0.9, 1.9);
+        q.y[p] = random(2.1, 3.9);
+        q.sxx[p] = q.x[p] + 100 * q.y[p];
+        q.half_x[p] = random(0.01, 0.4);  // some are wider than a cell
+        q.half_y[p] = random(0.01, 0.2);
+        q.id[p] = static_cast<std::uint32_t>(p);
+    }
+    return q;
+}
+}  // namespace
+
+template <class T>
+class BinsTest : public testing::Test
+{
+};
+using HasBox = testing::Types<std::false_type, std::true_type>;
+TYPED_TEST_SUITE(BinsTest, HasBox);
+
+/// Each point lies in the bin of its support's corner, all fields move together, none is lost, and a second sort changes nothing.
+TYPED_TEST(BinsTest, SortsPoints)
+{
+    constexpr bool has_box = TypeParam::value;
+    Points q = random_points(500, 8);
+    Bins bins(lattice);
+    std::vector<double> workspace;
+    bins.rebuild<has_box>(q, workspace);
+    std::vector<bool> seen(q.count, false);
+    std::size_t next = 0;
+    for (const Bin& b : bins.list())
+    {
+        EXPECT_EQ(b.begin, next);
+        EXPECT_GT(b.end, b.begin);
+        next = b.end;
+        for (std::size_t p = b.begin; p < b.end; ++p)
+        {
+            const double hx = has_box ? std::min(q.half_x[p], 0.25) : 0, hy = has_box ? std::min(q.half_y[p], 0.25) : 0;
+            EXPECT_EQ(b.i, std::floor((q.x[p] - hx + 1) / 0.5));
+            EXPECT_EQ(b.j, std::floor((q.y[p] - hy - 2) / 0.5));
+            EXPECT_DOUBLE_EQ(q.sxx[p], q.x[p] + 100 * q.y[p]);
+            EXPECT_FALSE(seen[q.id[p]]);
+            seen[q.id[p]] = true;
+        }
+    }
+    EXPECT_EQ(next, q.count);
+    const std::vector<std::uint32_t> before(q.id.data(), q.id.data() + q.count);
+    bins.rebuild<has_box>(q, workspace);
+    EXPECT_TRUE(std::equal(before.begin(), before.end(), q.id.data()));
+}
+
+TEST(Bins, RefusePointsOutsideAndNotFinite)
+{
+    Bins bins(lattice);
+    std::vector<double> workspace;
+    for (const double x : {-1.01, 2.01, std::nan(""), 1e300, -1e300})
+    {
+        Points q = random_points(10, 9);
+        q.x[4] = x;
+        EXPECT_THROW(bins.rebuild<false>(q, workspace), Diverged) << x;
+    }
+    Points q = random_points(10, 9);
+    q.half_y[4] = -0.1;  // an inverted box
+    EXPECT_THROW(bins.rebuild<true>(q, workspace), Diverged);
+}
+
+/// Sums over blocks, against adding each block to a map.
+TEST(Gather, AddsTheBlocksOfEachNode)
+{
+    Points a = random_points(200, 10), b = random_points(50, 11);
+    Bins bins_a(lattice), bins_b(lattice);
+    std::vector<double> workspace;
+    bins_a.rebuild<true>(a, workspace);
+    bins_b.rebuild<true>(b, workspace);
+    Gather gather(lattice.nodes());
+    const std::vector<const Bins*> all{&bins_a, &bins_b};
+    const auto node = [](int i, int j) { return lattice.node(i, j); };
+    for (int twice = 0; twice < 2; ++twice)
+        gather.rebuild<3>(all, node);
+    std::vector<double> partial(gather.blocks() * 2);
+    std::map<std::size_t, double> expected;
+    std::size_t block = 0;
+    for (const Bins* bins : all)
+        for (const Bin& bin : bins->list())
+            for (int k = 0; k < 9; ++k, ++block)
+            {
+                partial[2 * block] = static_cast<double>(block);
+                partial[2 * block + 1] = 1;
+                expected[node(bin.i + k % 3, bin.j + k / 3)] += static_cast<double>(block);
+            }
+    ASSERT_EQ(block, gather.blocks());
+    EXPECT_EQ(gather.active().size(), expected.size());
+    EXPECT_TRUE(std::is_sorted(gather.active().begin(), gather.active().end()));
+    gather.sum<2>(partial, [&](std::size_t n, const std::array<double, 2>& s) { EXPECT_DOUBLE_EQ(s[0], expected[n]); });
+}
+
+TEST(Lattice, IndicesInvert)
+{
+    for (int j = -1; j <= lattice.ny + 1; ++j)
+        for (int i = -1; i <= lattice.nx + 1; ++i)
+        {
+            EXPECT_EQ(lattice.node_i(lattice.node(i, j)), i);
+            EXPECT_EQ(lattice.node_j(lattice.node(i, j)), j);
+            EXPECT_LT(lattice.node(i, j), lattice.nodes());
+            EXPECT_EQ(lattice.cell_i(lattice.cell(i, j)), i);
+            EXPECT_EQ(lattice.cell_j(lattice.cell(i, j)), j);
+            EXPECT_LT(lattice.cell(i, j), lattice.cells());
+        }
+    EXPECT_DOUBLE_EQ(lattice.node_position(lattice.node(2, 3))[1], 3.5);
+}
+
+TEST(OrderedSum, SameBitsForAnyThreads)
+{
+    test::Random random(12);
+    std::vector<double> v(100000);
+    for (double& x : v)
+        x = random(-1, 1);
+    const auto total = [&] { return ordered_sum<1>(v.size(), [&](std::size_t i) { return std::array<double, 1>{v[i]}; })[0]; };
+    set_threads(1);
+    const double one = total();
+    set_threads(3);
+    EXPECT_EQ(total(), one);
+    set_threads(1);
+    EXPECT_NEAR(one, std::accumulate(v.begin(), v.end(), 0.0), 1e-9);
+}

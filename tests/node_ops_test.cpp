@@ -1,0 +1,108 @@
+#include "core/body.hpp"
+#include "core/node_ops.hpp"
+#include "core/solver.hpp"
+#include "tests/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace testbed;
+
+namespace
+{
+Nodes two_nodes()
+{
+    Nodes nodes(3);
+    nodes.active = {0, 2};
+    nodes.mass = {2, 5, 4};
+    nodes.vx = {1, 7, -1};
+    nodes.fx = {10, 11, 12};
+    return nodes;
+}
+}  // namespace
+
+TEST(Gravity, RampsSmoothly)
+{
+    const Gravity gravity{{0, -9.81}, 2.0};
+    EXPECT_DOUBLE_EQ(gravity.factor(0), 0);
+    EXPECT_NEAR(gravity.factor(1), 0.5, 1e-12);
+    EXPECT_DOUBLE_EQ(gravity.factor(2), 1);
+    EXPECT_DOUBLE_EQ((Gravity{{0, -9.81}, 0}.factor(0)), 1);  // at once
+    Nodes nodes = two_nodes();
+    gravity.apply(nodes, 5);
+    EXPECT_DOUBLE_EQ(nodes.fy[0], -2 * 9.81);
+    EXPECT_DOUBLE_EQ(nodes.fy[1], 0);  // not in use
+}
+
+/// Eq. (15): opposes the motion, whatever the sign of the force; nothing at rest.
+TEST(LocalDamping, AlwaysOpposesTheMotion)
+{
+    const LocalDamping damping{0.8};
+    EXPECT_DOUBLE_EQ(damping.damped(10, 1), 2);
+    EXPECT_DOUBLE_EQ(damping.damped(-10, 1), -18);
+    EXPECT_DOUBLE_EQ(damping.damped(10, -1), 18);
+    EXPECT_DOUBLE_EQ(damping.damped(10, 0), 10);
+}
+
+TEST(Accelerate, ByForceOverMass)
+{
+    Nodes nodes = two_nodes();
+    nodes.mass[2] = 0;
+    accelerate(nodes, 0.1);
+    EXPECT_DOUBLE_EQ(nodes.vx[0], 1.5);
+    EXPECT_DOUBLE_EQ(nodes.vx[1], 7);
+    EXPECT_DOUBLE_EQ(nodes.vx[2], -1);  // no mass, no acceleration
+}
+
+TEST(NodalSums, EnergyAndMomenta)
+{
+    Nodes nodes = two_nodes();
+    const Lattice lattice{{0, 0}, 1.0, 1, 1};
+    const MotionSums s = nodal_sums(lattice, nodes, 0.2, 5.0);
+    // v at the time of the force: 1 + 10/2*0.2 = 2, -1 + 12/4*0.2 = -0.4
+    EXPECT_NEAR(s.kinetic_energy, 0.5 * 2 * 4 + 0.5 * 4 * 0.16, 1e-12);
+    EXPECT_NEAR(s.momentum[0], 4 - 1.6, 1e-12);
+    EXPECT_NEAR(s.unbalanced, std::hypot(10, 12) / 5, 1e-12);
+    // nodes 0 and 2 of the padded lattice stand at y = -1: L = -y m v_x
+    EXPECT_NEAR(s.angular_momentum, 2.4, 1e-12);
+}
+
+TEST(NodeOps, FixitiesOfAScene)
+{
+    const Scene scene = test::load(test::two_bodies() + R"(
+[gravity]
+acceleration = [0.0, -9.81]
+[damping]
+local = 0.5
+[[boundary]]
+name = "base"
+where = "y <= -1"
+fix = "xy"
+[[boundary]]
+name = "left"
+where = "x <= -1"
+fix = "x"
+)");
+    const Lattice lattice = make_lattice(scene.grid);
+    const NodeOps ops = make_node_ops(scene, lattice);
+    EXPECT_EQ(ops.forces.size(), 2u);
+    std::vector<double> vx(lattice.nodes(), 1), vy(lattice.nodes(), 1);
+    ops.apply_fixities(vx, vy);
+    EXPECT_EQ(vy[lattice.node(3, 0)], 0);
+    EXPECT_EQ(vx[lattice.node(0, 3)], 0);
+    EXPECT_EQ(vy[lattice.node(0, 3)], 1);
+    EXPECT_EQ(vx[lattice.node(3, 3)], 1);
+    EXPECT_EQ(vx[lattice.node(-1, 3)], 0);  // the ring around the lattice, too
+}
+
+TEST(NodeOps, WhatASceneDoesNotHaveIsAbsent)
+{
+    const Scene scene = test::load(test::two_bodies());
+    const NodeOps ops = make_node_ops(scene, make_lattice(scene.grid));
+    EXPECT_TRUE(ops.forces.empty() && ops.fixities.empty());
+}
+
+TEST(NodeOps, ABoundaryWithoutNodesIsAnError)
+{
+    const Scene scene = test::load(test::two_bodies() + "[[boundary]]\nname = \"far\"\nwhere = \"y > 100\"\nfix = \"x\"\n");
+    EXPECT_THROW(make_node_ops(scene, make_lattice(scene.grid)), SceneError);
+}

@@ -1,0 +1,44 @@
+#pragma once
+/// Reproducible random input for tests.
+
+#include "core/types.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+namespace testbed::test
+{
+class Random
+{
+public:
+    explicit Random(unsigned seed) : engine_(seed) {}
+    double operator()(double low, double high) { return low + (high - low) * static_cast<double>(engine_()) / 4294967296.0; }
+
+    /// A convex polygon with n corners on an ellipse, anticlockwise.
+    std::vector<Vec2> convex_polygon(int n)
+    {
+        std::vector<double> angle;
+        for (int k = 0; k < n; ++k)
+            angle.push_back(2 * std::numbers::pi * (k + (*this)(0.1, 0.9)) / n);
+        const double a = (*this)(0.5, 2), b = (*this)(0.5, 2), cx = (*this)(-3, 3), cy = (*this)(-3, 3);
+        std::vector<Vec2> corners;
+        for (const double t : angle)
+            corners.push_back({cx + a * std::cos(t), cy + b * std::sin(t)});
+        return corners;
+    }
+    std::vector<Vec2> vectors(std::size_t n)
+    {
+        std::vector<Vec2> v(n);
+        for (Vec2& x : v)
+            x = {(*this)(-1, 1), (*this)(-1, 1)};
+        return v;
+    }
+    SymTensor<> stress(double size = 1) { return {(*this)(-size, size), (*this)(-size, size), (*this)(-size, size)}; }
+
+private:
+    std::mt19937 engine_;
+};
+}  // namespace testbed::test

@@ -1,0 +1,101 @@
+#include "core/support.hpp"
+#include "mpm/shape.hpp"
+#include "tests/random.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace testbed;
+
+namespace
+{
+double hat(double x)
+{
+    return std::max(0.0, 1 - std::abs(x));
+}
+/// Mean of f over [a, a + w] by the midpoint rule.
+template <class F>
+double mean(double a, double w, F&& f)
+{
+    constexpr int n = 20000;
+    double s = 0;
+    for (int k = 0; k < n; ++k)
+        s += f(a + w * (k + 0.5) / n);
+    return s / n;
+}
+}  // namespace
+
+/// Shares of a box in cells, against their definition.
+TEST(DomainSupport, IsTheOverlap)
+{
+    test::Random random(6);
+    for (int trial = 0; trial < 200; ++trial)
+    {
+        const double a = random(0, 1), w = random(0.05, 1);
+        const auto s = DomainSupport::weights(a, w);
+        EXPECT_NEAR(s[0], (std::min(a + w, 1.0) - a) / w, 1e-12);
+        EXPECT_NEAR(s[1], std::max(a + w - 1, 0.0) / w, 1e-12);
+    }
+    EXPECT_EQ(DomainSupport::weights(0.75, 0.25 + 1e-12)[1], 0);  // rounding does not reach the next cell
+}
+
+TEST(LinearShape, PartitionOfUnityAndLinearFields)
+{
+    for (const double a : {0.0, 0.3, 0.99})
+    {
+        const auto N = LinearShape::weights(a, 0.0), G = LinearShape::slopes(a, 0.0);
+        EXPECT_DOUBLE_EQ(N[0] + N[1], 1);
+        EXPECT_DOUBLE_EQ(N[1], a);
+        EXPECT_DOUBLE_EQ(G[0] + G[1], 0);
+        EXPECT_DOUBLE_EQ(G[1], 1);
+    }
+}
+
+/// GIMP weights and slopes are means of the hat function and of its slope over the box.
+TEST(GimpShape, IsTheMeanOfTheHat)
+{
+    test::Random random(7);
+    for (int trial = 0; trial < 100; ++trial)
+    {
+        const double a = random(0, 1), w = random(0.05, 1);
+        const auto N = GimpShape::weights(a, w), G = GimpShape::slopes(a, w);
+        double unity = 0, linear = 0, slope = 0;
+        for (int i = 0; i < 3; ++i)
+        {
+            EXPECT_NEAR(N[i], mean(a, w, [&](double x) { return hat(x - i); }), 1e-8);
+            EXPECT_NEAR(G[i], (hat(a + w - i) - hat(a - i)) / w, 1e-12);
+            unity += N[i];
+            linear += i * N[i];
+            slope += i * G[i];
+        }
+        EXPECT_NEAR(unity, 1, 1e-14);
+        EXPECT_NEAR(linear, a + w / 2, 1e-13);  // reproduces the centre
+        EXPECT_NEAR(slope, 1, 1e-13);
+    }
+}
+
+/// Packs and single numbers give the same.
+TEST(GimpShape, PackEqualsScalar)
+{
+    const auto scalar = GimpShape::weights(0.8, 0.5);
+    const auto pack = GimpShape::weights(Pack(0.8), Pack(0.5));
+    for (int i = 0; i < 3; ++i)
+        EXPECT_DOUBLE_EQ(static_cast<double>(pack[i][0]), scalar[i]);
+}
+
+TEST(Lanes, MaskWhatLiesBehindTheEnd)
+{
+    std::vector<double> data(3 * pack_size, 1.0);
+    double total = 0;
+    std::size_t calls = 0;
+    for_each_pack(2, 2 + pack_size + 3, [&](std::size_t p, const auto& lanes) {
+        const Pack v = lanes.load(&data[p]);
+        total += sum(lanes.keep(v));
+        lanes.store(&data[p], v + Pack(1.0));
+        EXPECT_FALSE(lanes.any(v > Pack(1.5)));
+        ++calls;
+    });
+    EXPECT_EQ(calls, 2u);
+    EXPECT_DOUBLE_EQ(total, static_cast<double>(pack_size) + 3);
+    for (std::size_t k = 0; k < data.size(); ++k)
+        EXPECT_DOUBLE_EQ(data[k], k >= 2 && k < 5 + pack_size ? 2 : 1) << k;
+}
