@@ -5,32 +5,36 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <omp.h>
 #include <vector>
 
 namespace testbed
 {
+namespace detail
+{
+inline int team = 1;
+}
+/// One thread unless asked for more: studies run many small cases side by side.
 inline void set_threads(int n)
 {
-    omp_set_num_threads(n);
+    detail::team = n;
 }
 inline int threads()
 {
-    return omp_get_max_threads();
+    return detail::team;
 }
 
 /// f(i) for i in [0, n); iterations must not write to the same place and must not throw.
 template <class F>
 void parallel_for(std::size_t n, F&& f)
 {
-    constexpr std::size_t worth_a_team = 64;
-    if (omp_get_max_threads() == 1 || n < worth_a_team)
+    constexpr std::size_t worth_a_team = 256;
+    if (detail::team == 1 || n < worth_a_team)
     {
         for (std::size_t i = 0; i < n; ++i)
             f(i);
         return;
     }
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) num_threads(detail::team)
     for (std::size_t i = 0; i < n; ++i)
         f(i);
 }
@@ -42,7 +46,7 @@ std::array<double, K> ordered_sum(std::size_t n, F&& f)
     constexpr std::size_t chunk = 4096;
     const std::size_t chunks = (n + chunk - 1) / chunk;
     std::vector<std::array<double, K>> partial(chunks);
-#pragma omp parallel for schedule(static) if (chunks > 1)
+#pragma omp parallel for schedule(static) num_threads(detail::team) if (chunks > 1)
     for (std::size_t c = 0; c < chunks; ++c)
     {
         std::array<double, K> s{};
@@ -66,7 +70,7 @@ template <class F>
 double parallel_max(std::size_t n, F&& f)
 {
     double m = 0;
-#pragma omp parallel for schedule(static) reduction(max : m) if (n > 4096)
+#pragma omp parallel for schedule(static) reduction(max : m) num_threads(detail::team) if (n > 4096)
     for (std::size_t i = 0; i < n; ++i)
         m = std::max(m, f(i));
     return m;

@@ -33,6 +33,8 @@ State run(const std::string& name, const std::string& method, const std::vector<
         s.t = n * dt;
         s.solver->prepare(s.t, dt);
         watch(s);
+        if (n == steps)
+            break;
         if (s.scene.time.stop_unbalanced && n % 50 == 0 && n > 0 && s.t > s.scene.gravity->ramp &&
             s.solver->sums().unbalanced < *s.scene.time.stop_unbalanced && Observer::kinetic_ratio(*s.solver) < *s.scene.time.stop_unbalanced)
             break;
