@@ -40,6 +40,10 @@ HISTORY_NAMES = {"kinetic_energy": ("Kinetic energy", "J/m"), "strain_energy": (
                  "linear_momentum": ("Momentum $|p|$", "kg/s")}
 
 
+# An error below this is rounding: its method is exact here and would flatten the picture of the others.
+ROUNDING = 1e-9
+
+
 class FigureError(Exception):
     """A figure that cannot be drawn; the message says why."""
 
@@ -198,6 +202,12 @@ def _gather(runs, quantity, norm, x):
     return np.array(rows, float).reshape(-1, 4).T, sorted(set(lost))
 
 
+def _floor(axis, at, label, style):
+    """Points that are exact to rounding, on the lower edge."""
+    axis.plot(at, [0.0] * len(at), transform=axis.get_xaxis_transform(), linestyle="none", marker=style.marker(label),
+              markersize=4.5, markerfacecolor="white", markeredgecolor=style.colour(label), clip_on=False, zorder=5)
+
+
 X_NAMES = {"L": "Cell size $L$ [m]", "dt": "Time step [s]", "ppc": "Points per cell and direction",
            "grid.cell_size": "Cell size $L$ [m]"}
 
@@ -210,16 +220,22 @@ def convergence(study, entry, style):
         raise FigureError(f"no run has {quantity} {norm}".rstrip() + f" (there is: {', '.join(known) or 'nothing'})")
     series = {label: _gather(own, quantity, norm, x) for label, own in by_series(runs, entry, style).items()}
     notes, labels, fits = [], {}, {}
+    exact = {}
+    if metrics.is_error(quantity, norm):
+        exact = {label: data for label, (data, _) in series.items() if data.shape[1] and (data[1] < ROUNDING).all()}
+        exact = {} if len(exact) == sum(data.shape[1] > 0 for data, _ in series.values()) else exact
+    limits = sorted((entry.get("L_from", math.inf), entry.get("L_to", 0.0)))
     for label, (data, lost) in series.items():
         labels[label] = label
-        if metrics.is_error(quantity, norm) and data.shape[1] > 1:
-            keep = (data[0] <= entry.get("L_from", math.inf) * (1 + 1e-9)) & \
-                   (data[0] >= entry.get("L_to", 0) * (1 - 1e-9))
+        if label in exact:
+            labels[label] = f"{label}: exact (≤ {number(data[1].max())})"
+        elif metrics.is_error(quantity, norm) and data.shape[1] > 1:
+            keep = (data[0] <= limits[1] * (1 + 1e-9)) & (data[0] >= limits[0] * (1 - 1e-9))
             fits[label] = fit_order(data[0][keep], data[1][keep])
-            labels[label] = f"{label}: order {fits[label]}"
+            labels[label] = f"{label}: order {fits[label]}" if math.isfinite(fits[label].order) else label
         elif not data.shape[1]:
             labels[label] = f"{label}: no number"
-    finite = [(a, b) for data, _ in series.values() for a, b in data[:2].T if b > 0]
+    finite = [(a, b) for label, (data, _) in series.items() if label not in exact for a, b in data[:2].T if b > 0]
     if not finite:
         raise FigureError("no completed run has a positive number")
     failing = {label: lost for label, (_, lost) in series.items() if lost}
@@ -238,6 +254,9 @@ def convergence(study, entry, style):
     handles, capped = [], False
     for label, (data, _) in series.items():
         handles.append(Line2D([], [], **style.of(label), label=labels[label]))
+        if label in exact:
+            _floor(axis, data[0], label, style)
+            continue
         if not data.shape[1]:
             continue
         shown = np.where(data[1] > high, np.nan, data[1])
@@ -271,6 +290,8 @@ def convergence(study, entry, style):
     legend_below(figure, handles, columns)
     if any(math.isfinite(f.order) for f in fits.values()):
         notes.append("Orders are log-log least squares with their 95 % interval")
+    if exact:
+        notes.append("Methods that are exact to rounding stand on the lower edge")
     if capped:
         notes.append("Triangles at the upper edge are off the scale")
     for label, where in failing.items():
@@ -300,17 +321,22 @@ def work_precision(study, entry, style):
         without = [r for r in own if not r.value("solve_s") > 0]
         if without:
             notes.append(f"{label}: {len(without)} of {len(own)} runs have no result")
-    finite = np.concatenate([s for s in series.values() if len(s)] or [np.empty((0, 5))])
+    exact = [label for label, s in series.items() if len(s) and (s[:, 1] < ROUNDING).all()]
+    exact = [] if len(exact) == sum(len(s) > 0 for s in series.values()) or not metrics.is_error(quantity, norm) else exact
+    finite = np.concatenate([s for label, s in series.items() if len(s) and label not in exact] or [np.empty((0, 5))])
     if not len(finite):
         raise FigureError(f"no completed run has {quantity} {norm} and a solve time".replace("  ", " "))
     width = WIDTH[entry.get("width", "column")]
-    columns, rows = legend_shape(series, width)
+    columns, rows = legend_shape([f"{label}: exact (≤ 1.00e-12)" if label in exact else label for label in series], width)
     figure, axes = frame(width, 2.3, rows, rails=len(failing), left=0.62, right=0.12)
     axis = axes[0, 0]
     handles = []
     for label, data in series.items():
-        handles.append(Line2D([], [], **style.of(label), label=label))
-        if len(data):
+        text = f"{label}: exact (≤ {number(data[:, 1].max())})" if label in exact else label
+        handles.append(Line2D([], [], **style.of(label), label=text))
+        if label in exact:
+            _floor(axis, data[:, 2], label, style)
+        elif len(data):
             bars = np.array([data[:, 2] - data[:, 3], data[:, 4] - data[:, 2]])
             axis.errorbar(data[:, 2], data[:, 1], xerr=bars, **style.of(label), elinewidth=0.7, capsize=1.8)
     axis.set_xscale("log")
@@ -319,13 +345,15 @@ def work_precision(study, entry, style):
     if finite[:, 1].max() > 1.6 * high:
         notes.append("Errors above the upper edge are off the scale")
     _log_y(axis, finite[:, 1].min() / 1.6, high * 1.6)
-    every = np.concatenate([finite[:, 3], finite[:, 4], *failing.values()])
+    every = np.concatenate([s[:, k] for s in series.values() if len(s) for k in (3, 4)] + list(failing.values()))
     axis.set_xlim(every.min() / 1.5, every.max() * 1.5)
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_xlabel("Solve time [s]")
     axis.set_ylabel(name_of(quantity, norm))
     _rails(axis, failing, style, "failed")
     legend_below(figure, handles, columns)
+    if exact:
+        notes.append("Methods that are exact to rounding stand on the lower edge")
     notes.insert(0, "Medians of repeats with their range; set-up and output are left out")
     return Drawing(figure, runs, notes)
 
@@ -537,7 +565,10 @@ def field_maps(study, entry, style):
             axis.set_xlim(x0, x1)
             axis.set_ylim(y0, y1)
             axis.set_aspect("equal")
-            axis.locator_params(axis="x", nbins=2 if panel < 0.8 else 4)
+            if panel < 0.4:  # room for one number
+                axis.set_xticks([0.0 if x0 <= 0 <= x1 else x0])
+            else:
+                axis.locator_params(axis="x", nbins=2 if panel < 0.8 else 4)
             axis.locator_params(axis="y", nbins=max(2, min(6, int(height / 0.35))))
             axis.set_title(label, pad=3, fontsize=8 if len(label) * 0.07 < panel + gap else 6)
             if k % columns:
@@ -586,7 +617,7 @@ def _history_values(result, entry, exact=False):
 
 
 def _scale(run, scale):
-    if scale is None:
+    if scale is None or scale == "initial":
         return 1.0
     if isinstance(scale, str):
         reference = run.result.reference
@@ -609,6 +640,8 @@ def history(study, entry, style):
             if entry.get("log"):
                 values = np.where(values > 0, values, np.nan)
             keep = time <= entry.get("t_max", math.inf)
+            if entry.get("scale_y") == "initial":
+                sy = values[0]
             lines.append((label, run, time[keep] / sx, values[keep] / sy))
             true = _history_values(run.result, entry, True)
             if true is not None and run.completed and (exact is None or len(time) > len(exact[0])):
@@ -625,6 +658,7 @@ def history(study, entry, style):
     if "scale_y" in entry:
         by = entry["scale_y"]
         title = title.split(" ")[-1] if "$" in title else title
+        by = "initial value" if by == "initial" else by
         title, unit = f"{title} / {by.replace('_', ' ') if isinstance(by, str) else number(by)}", ""
     else:
         unit, factor = _axis_scale(bounded, unit)

@@ -36,11 +36,15 @@ class Style:
         self.slots.update({label: k for label, k in zip((v for v in self.labels if v not in KNOWN), free)})
 
     def slot(self, label):
+        variant = str(label).split(",")[0]  # "lpfdm, ppc = 2" looks like lpfdm
+        if variant in self.slots:
+            return self.slots[variant]
         return self.slots.setdefault(label, max(self.slots.values(), default=-1) + 1)
 
     def rank(self, label):
         """Place of a label in legends."""
-        return self.labels.index(label) if label in self.labels else len(self.labels)
+        variant = str(label).split(",")[0]
+        return (self.labels.index(variant) if variant in self.labels else len(self.labels), str(label))
 
     def colour(self, label):
         return COLOURS[self.slot(label) % len(COLOURS)]

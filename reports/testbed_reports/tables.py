@@ -9,7 +9,7 @@ import numpy as np
 
 from . import metrics
 from .convergence import fit_order, pairwise_orders
-from .targets import mean_by_size, number
+from .targets import digits_of, mean_by_size, number
 
 
 @dataclass
@@ -57,13 +57,13 @@ def as_latex(table):
     return "\n".join(lines + [r"\bottomrule", r"\end{tabular}"]) + "\n"
 
 
-def _range(values):
+def _range(values, digits=3):
     """'median [min-max]' of finite values."""
     values = [v for v in values if isinstance(v, (int, float)) and math.isfinite(v)]
     if not values:
         return "n/a"
-    middle = number(statistics.median(values))
-    return middle if len(values) < 2 else f"{middle} [{number(min(values))}–{number(max(values))}]"
+    middle = number(statistics.median(values), digits)
+    return middle if len(values) < 2 else f"{middle} [{number(min(values), digits)}–{number(max(values), digits)}]"
 
 
 def _whole(value):
@@ -85,8 +85,8 @@ def _ratio_note(runs):
 def _groups(study):
     """Runs by variant, and within by further axes than method, cell size and repeats, as labels."""
     further = [k for run in study.runs for k in run.values
-               if k not in ("method", "variant", "L", "ppc", "dt", "seed", "repeat", "grid.cell_size")]
-    varying = [k for k in dict.fromkeys(further) if len({str(r.values.get(k)) for r in study.runs}) > 1]
+               if k not in ("scene", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "grid.cell_size")]
+    varying = [k for k in dict.fromkeys(further) if len({str(r.values[k]) for r in study.runs if k in r.values}) > 1]
     groups = {}
     for run in study.runs:
         parts = [run.name] + [f"{k.rsplit('.', 1)[-1]} = {run.values.get(k)}" for k in varying]
@@ -118,7 +118,7 @@ def convergence_table(study, quantity, norm):
                 continue
             status = next((r.status for r in runs if r.values.get("L") == size and not r.completed), None)
             value = mean[at[0]]
-            row.append(number(float(value)) if math.isfinite(value) else status or "n/a")
+            row.append(number(float(value), digits_of(quantity, norm)) if math.isfinite(value) else status or "n/a")
             if ordered:
                 order = pairwise_orders(own_sizes, mean)[at[0]]
                 row.append(f"{order:.2f}" if math.isfinite(order) else "")
@@ -144,7 +144,7 @@ def values_table(study):
         row = [key[0], key[1]]
         for runs in groups.values():
             values = [run.value(*key) for run in runs]
-            row.append(_range(sorted(set(v for v in values if math.isfinite(v)))) if any(map(math.isfinite, values))
+            row.append(_range(sorted(set(v for v in values if math.isfinite(v))), digits_of(*key)) if any(map(math.isfinite, values))
                        else next((r.status for r in runs if not r.completed), "n/a"))
         rows.append(row)
     return Table("values", "Measured quantities", ["quantity", "norm", *groups], rows, 2)

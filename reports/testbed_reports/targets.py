@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import metrics
 from .convergence import fit_order
 from .study_file import matches
 
@@ -21,16 +22,21 @@ class Verdict:
     source: str = ""
 
 
-def number(value):
-    """Three significant digits."""
+def number(value, digits=3):
+    """So many significant digits."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "n/a"
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     if 1e-3 <= abs(value) < 1e4:
-        text = f"{float(f'{value:.2e}'):.{max(0, 2 - math.floor(math.log10(abs(float(f'{value:.2e}')))))}f}"
-        return text
-    return f"{value:.2e}"
+        rounded = float(f"{value:.{digits - 1}e}")
+        return f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def digits_of(quantity, norm):
+    """Errors are read to three digits; a ratio near one or two needs five."""
+    return 3 if metrics.is_error(quantity, norm) else 5
 
 
 def asked(target):
@@ -90,12 +96,13 @@ def _judge_value(target, runs, quantity, norm):
     high = target.get("high", target["value"] if target["kind"] == "value_max" else math.inf)
     lost = [run for run, v in zip(runs, values) if not math.isfinite(v)]
     good = [v for v in values if math.isfinite(v)]
+    digits = digits_of(quantity, norm)
     if not good:
         measured = "n/a"
     elif len(good) == 1 or math.isclose(min(good), max(good), rel_tol=1e-6):
-        measured = number(good[0])
+        measured = number(good[0], digits)
     else:
-        measured = f"{number(min(good))} to {number(max(good))}"
+        measured = f"{number(min(good), digits)} to {number(max(good), digits)}"
     if lost:
         return measured, "fail", "no number: " + ", ".join(_why(run, quantity, norm) for run in lost)
     return measured, "pass" if all(low <= v <= high for v in good) else "fail", ""
