@@ -54,10 +54,13 @@ std::string fields_and_modules(const Scene& scene, Solver& solver)
 {
     std::vector<std::string> fields, modules{find_variant(scene.method).family};
     for (const Body& body : solver.bodies())
-        const_cast<Points&>(body.points).for_each_field([&](const auto& f) {
-            if (std::find(fields.begin(), fields.end(), f.name()) == fields.end())
-                fields.emplace_back(f.name());
-        });
+        const_cast<Points&>(body.points)
+            .for_each_field(
+                [&](const auto& f)
+                {
+                    if (std::find(fields.begin(), fields.end(), f.name()) == fields.end())
+                        fields.emplace_back(f.name());
+                });
     if (scene.gravity)
         modules.emplace_back("gravity");
     if (scene.damping)
@@ -104,7 +107,8 @@ void check(const RunOptions& options, bool resolved)
     }
     const std::unique_ptr<Solver> solver = make_particle_solver(scene);
     solver->prepare(0, time_step(scene));
-    fmt::print("cells in use     {}\nunknowns         {}\n{}", solver->active_cells(), solver->unknowns(), fields_and_modules(scene, *solver));
+    fmt::print("cells in use     {}\nunknowns         {}\n{}", solver->active_cells(), solver->unknowns(),
+               fields_and_modules(scene, *solver));
     fmt::print("bytes per point  {:.1f} (all arrays, {:.3g} MB)\n", static_cast<double>(solver->bytes()) / static_cast<double>(points),
                1e-6 * static_cast<double>(solver->bytes()));
 }

@@ -78,8 +78,7 @@ public:
 
     std::size_t bytes() const
     {
-        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) +
-               place_.capacity() * sizeof(std::uint32_t);
+        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + place_.capacity() * sizeof(std::uint32_t);
     }
 
 private:

@@ -42,7 +42,8 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
     {
         const std::vector<Vec2> positions = fill(spec, scene.grid);
         if (positions.empty())
-            throw SceneError(fmt::format("{}: body '{}' has no points; it is smaller than the spacing of its points", scene.path, spec.name));
+            throw SceneError(
+                fmt::format("{}: body '{}' has no points; it is smaller than the spacing of its points", scene.path, spec.name));
         const MaterialSpec& material = scene.material(spec.material);
         const Expression modulus(material.youngs_modulus, constants);
         const bool varies = !is_number(material.youngs_modulus);

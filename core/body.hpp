@@ -18,8 +18,8 @@ struct Body
 /// What a method asks of each point beyond position and stress.
 struct PointNeeds
 {
-    bool box = false;       ///< half widths; the volume then follows from them
-    bool velocity = false;  ///< velocity on the points
+    bool box = false;              ///< half widths; the volume then follows from them
+    bool velocity = false;         ///< velocity on the points
     bool initial_position = true;  ///< kept with the points, for what is evaluated there in each step
 };
 

@@ -28,9 +28,10 @@ public:
                 bx_[p] = q.mass * b[0];
                 by_[p] = q.mass * b[1];
             }
-            spread<Support, 2>(lattice, body, first_bin, partial_, [&](std::size_t p, const auto& lanes) {
-                return std::array<Pack, 2>{lanes.load(&bx_[p]), lanes.load(&by_[p])};
-            });
+            spread<Support, 2>(lattice, body, first_bin, partial_,
+                               [&](std::size_t p, const auto& lanes) {
+                                   return std::array<Pack, 2>{lanes.load(&bx_[p]), lanes.load(&by_[p])};
+                               });
             first_bin += body.bins.list().size();
         }
         gather.sum<2>(partial_, sink);

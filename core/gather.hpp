@@ -25,41 +25,46 @@ public:
         for (const auto e : active_)
             position_[e] = -1;
         active_.clear();
-        for_each_block<S>(bins, index, [&](std::size_t e, std::uint32_t) {
-            if (position_[e] < 0)
-            {
-                position_[e] = 0;
-                active_.push_back(static_cast<std::uint32_t>(e));
-            }
-        });
+        for_each_block<S>(bins, index,
+                          [&](std::size_t e, std::uint32_t)
+                          {
+                              if (position_[e] < 0)
+                              {
+                                  position_[e] = 0;
+                                  active_.push_back(static_cast<std::uint32_t>(e));
+                              }
+                          });
         std::sort(active_.begin(), active_.end());
         active_.shrink_to_fit();
         begin_.assign(active_.size() + 1, 0);
         for (std::size_t a = 0; a < active_.size(); ++a)
             position_[active_[a]] = static_cast<std::int32_t>(a);
-        for_each_block<S>(bins, index,
-                          [&](std::size_t e, std::uint32_t) { ++begin_[static_cast<std::size_t>(position_[e]) + 1]; });
+        for_each_block<S>(bins, index, [&](std::size_t e, std::uint32_t) { ++begin_[static_cast<std::size_t>(position_[e]) + 1]; });
         std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
         block_.resize(begin_.back());
         std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
         blocks_ = 0;
-        for_each_block<S>(bins, index, [&](std::size_t e, std::uint32_t block) {
-            block_[next[static_cast<std::size_t>(position_[e])]++] = block;
-            blocks_ = block + std::size_t{1};
-        });
+        for_each_block<S>(bins, index,
+                          [&](std::size_t e, std::uint32_t block)
+                          {
+                              block_[next[static_cast<std::size_t>(position_[e])]++] = block;
+                              blocks_ = block + std::size_t{1};
+                          });
     }
 
     /// sink(entity, sums): for every active entity the sum of its blocks of Q numbers.
     template <std::size_t Q, class Sink>
     void sum(const std::vector<double>& partial, Sink&& sink) const
     {
-        parallel_for(active_.size(), [&](std::size_t a) {
-            std::array<double, Q> s{};
-            for (std::uint32_t k = begin_[a]; k < begin_[a + 1]; ++k)
-                for (std::size_t q = 0; q < Q; ++q)
-                    s[q] += partial[block_[k] * Q + q];
-            sink(active_[a], s);
-        });
+        parallel_for(active_.size(),
+                     [&](std::size_t a)
+                     {
+                         std::array<double, Q> s{};
+                         for (std::uint32_t k = begin_[a]; k < begin_[a + 1]; ++k)
+                             for (std::size_t q = 0; q < Q; ++q)
+                                 s[q] += partial[block_[k] * Q + q];
+                         sink(active_[a], s);
+                     });
     }
 
     std::size_t bytes() const

@@ -11,8 +11,7 @@ bool inside_polygon(const std::vector<Vec2>& v, const Vec2& p)
 {
     bool inside = false;
     for (std::size_t k = 0, last = v.size() - 1; k < v.size(); last = k++)
-        if ((v[k][1] > p[1]) != (v[last][1] > p[1]) &&
-            p[0] < v[k][0] + (p[1] - v[k][1]) / (v[last][1] - v[k][1]) * (v[last][0] - v[k][0]))
+        if ((v[k][1] > p[1]) != (v[last][1] > p[1]) && p[0] < v[k][0] + (p[1] - v[k][1]) / (v[last][1] - v[k][1]) * (v[last][0] - v[k][0]))
             inside = !inside;
     return inside;
 }
@@ -27,7 +26,8 @@ std::vector<Vec2> fill(const BodySpec& body, const GridSpec& grid)
         corner = *body.min;
         extent = {(*body.max)[0] - corner[0], (*body.max)[1] - corner[1]};
     }
-    const auto inside = [&](const Vec2& p) {
+    const auto inside = [&](const Vec2& p)
+    {
         if (body.shape == "disk")
             return std::hypot(p[0] - (*body.center)[0], p[1] - (*body.center)[1]) <= *body.radius;
         if (body.shape == "polygon")

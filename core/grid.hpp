@@ -19,24 +19,15 @@ struct Lattice
 
     std::size_t cell_stride() const { return static_cast<std::size_t>(nx) + 4; }
     std::size_t node_stride() const { return static_cast<std::size_t>(nx) + 3; }
-    std::size_t cell(int i, int j) const
-    {
-        return static_cast<std::size_t>(i + 2) + static_cast<std::size_t>(j + 2) * cell_stride();
-    }
-    std::size_t node(int i, int j) const
-    {
-        return static_cast<std::size_t>(i + 1) + static_cast<std::size_t>(j + 1) * node_stride();
-    }
+    std::size_t cell(int i, int j) const { return static_cast<std::size_t>(i + 2) + static_cast<std::size_t>(j + 2) * cell_stride(); }
+    std::size_t node(int i, int j) const { return static_cast<std::size_t>(i + 1) + static_cast<std::size_t>(j + 1) * node_stride(); }
     std::size_t cells() const { return cell_stride() * (static_cast<std::size_t>(ny) + 4); }
     std::size_t nodes() const { return node_stride() * (static_cast<std::size_t>(ny) + 3); }
     int cell_i(std::size_t c) const { return static_cast<int>(c % cell_stride()) - 2; }
     int cell_j(std::size_t c) const { return static_cast<int>(c / cell_stride()) - 2; }
     int node_i(std::size_t n) const { return static_cast<int>(n % node_stride()) - 1; }
     int node_j(std::size_t n) const { return static_cast<int>(n / node_stride()) - 1; }
-    Vec2 node_position(std::size_t n) const
-    {
-        return {origin[0] + node_i(n) * cell_size, origin[1] + node_j(n) * cell_size};
-    }
+    Vec2 node_position(std::size_t n) const { return {origin[0] + node_i(n) * cell_size, origin[1] + node_j(n) * cell_size}; }
 };
 
 /// Nodal unknowns, and which nodes carry mass at present.

@@ -54,8 +54,8 @@ inline std::vector<Vec2> polygon_forces(std::span<const Vec2> x, const SymTensor
 /// Eqs. (5a)-(5d) on a square cell: nodal values ux[4], uy[4] of a velocity [m/s] or increment [m], scale = dt/(2L) or 1/(2L).
 inline Gradient<> square_gradient(const double (&ux)[4], const double (&uy)[4], double scale)
 {
-    return {(ux[1] + ux[3] - ux[0] - ux[2]) * scale, (uy[2] + uy[3] - uy[0] - uy[1]) * scale,
-            (ux[2] + ux[3] - ux[0] - ux[1]) * scale, (uy[1] + uy[3] - uy[0] - uy[2]) * scale};
+    return {(ux[1] + ux[3] - ux[0] - ux[2]) * scale, (uy[2] + uy[3] - uy[0] - uy[1]) * scale, (ux[2] + ux[3] - ux[0] - ux[1]) * scale,
+            (uy[1] + uy[3] - uy[0] - uy[2]) * scale};
 }
 
 /// Eq. (9) on a square cell: force at node k = 0..3 from the smeared stress s [Pa]; half_side = L/2.

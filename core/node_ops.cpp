@@ -26,7 +26,8 @@ NodeOps make_node_ops(const Scene& scene, const Lattice& lattice)
                 fixity.y.push_back(static_cast<std::uint32_t>(n));
         }
         if (fixity.x.empty() && fixity.y.empty())
-            throw SceneError(fmt::format("{}: boundary '{}': where = \"{}\" holds at no node of the lattice", scene.path, spec.name, spec.where));
+            throw SceneError(
+                fmt::format("{}: boundary '{}': where = \"{}\" holds at no node of the lattice", scene.path, spec.name, spec.where));
         ops.fixities.push_back(std::move(fixity));
     }
     return ops;

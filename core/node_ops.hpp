@@ -23,11 +23,13 @@ struct Gravity
     void apply(Nodes& nodes, double t) const
     {
         const double f = factor(t), gx = f * acceleration[0], gy = f * acceleration[1];
-        parallel_for(nodes.active.size(), [&](std::size_t a) {
-            const std::size_t i = nodes.active[a];
-            nodes.fx[i] += gx * nodes.mass[i];
-            nodes.fy[i] += gy * nodes.mass[i];
-        });
+        parallel_for(nodes.active.size(),
+                     [&](std::size_t a)
+                     {
+                         const std::size_t i = nodes.active[a];
+                         nodes.fx[i] += gx * nodes.mass[i];
+                         nodes.fy[i] += gy * nodes.mass[i];
+                     });
     }
 };
 
@@ -36,17 +38,16 @@ struct LocalDamping
 {
     double alpha;
 
-    double damped(double force, double velocity) const
-    {
-        return force - alpha * std::abs(force) * ((velocity > 0) - (velocity < 0));
-    }
+    double damped(double force, double velocity) const { return force - alpha * std::abs(force) * ((velocity > 0) - (velocity < 0)); }
     void apply(Nodes& nodes, double) const
     {
-        parallel_for(nodes.active.size(), [&](std::size_t a) {
-            const std::size_t i = nodes.active[a];
-            nodes.fx[i] = damped(nodes.fx[i], nodes.vx[i]);
-            nodes.fy[i] = damped(nodes.fy[i], nodes.vy[i]);
-        });
+        parallel_for(nodes.active.size(),
+                     [&](std::size_t a)
+                     {
+                         const std::size_t i = nodes.active[a];
+                         nodes.fx[i] = damped(nodes.fx[i], nodes.vx[i]);
+                         nodes.fy[i] = damped(nodes.fy[i], nodes.vy[i]);
+                     });
     }
 };
 
@@ -68,7 +69,7 @@ using ForceOp = std::variant<Gravity, LocalDamping>;
 
 struct NodeOps
 {
-    std::vector<ForceOp> forces;    ///< in this order: damping acts on all that stands before it
+    std::vector<ForceOp> forces;  ///< in this order: damping acts on all that stands before it
     std::vector<Fixity> fixities;
 
     void apply_forces(Nodes& nodes, double t) const
@@ -96,20 +97,24 @@ inline double inverse_mass(const Nodes& nodes, std::size_t i)
 /// Eqs. (12), (14): v += F / m dt.
 inline void accelerate(Nodes& nodes, double dt)
 {
-    parallel_for(nodes.active.size(), [&](std::size_t a) {
-        const std::size_t i = nodes.active[a];
-        const double step = inverse_mass(nodes, i) * dt;
-        nodes.vx[i] += nodes.fx[i] * step;
-        nodes.vy[i] += nodes.fy[i] * step;
-    });
+    parallel_for(nodes.active.size(),
+                 [&](std::size_t a)
+                 {
+                     const std::size_t i = nodes.active[a];
+                     const double step = inverse_mass(nodes, i) * dt;
+                     nodes.vx[i] += nodes.fx[i] * step;
+                     nodes.vy[i] += nodes.fy[i] * step;
+                 });
 }
 
 inline double force_norm(const Nodes& nodes)
 {
-    const auto s = ordered_sum<1>(nodes.active.size(), [&](std::size_t a) {
-        const std::size_t i = nodes.active[a];
-        return std::array<double, 1>{nodes.fx[i] * nodes.fx[i] + nodes.fy[i] * nodes.fy[i]};
-    });
+    const auto s = ordered_sum<1>(nodes.active.size(),
+                                  [&](std::size_t a)
+                                  {
+                                      const std::size_t i = nodes.active[a];
+                                      return std::array<double, 1>{nodes.fx[i] * nodes.fx[i] + nodes.fy[i] * nodes.fy[i]};
+                                  });
     return std::sqrt(s[0]);
 }
 

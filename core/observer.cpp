@@ -35,17 +35,21 @@ PointSums point_sums(const std::vector<Body>& bodies)
     {
         const Points& q = body.points;
         const ElasticModuli base = moduli(body.material);
-        const auto s = ordered_sum<3>(q.count, [&](std::size_t p) {
-            const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
-            const double energy = elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}) / softer;
-            return std::array<double, 3>{energy * q.current_volume(p), q.mass * q.x[p], q.mass * q.y[p]};
-        });
+        const auto s = ordered_sum<3>(q.count,
+                                      [&](std::size_t p)
+                                      {
+                                          const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
+                                          const double energy = elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}) / softer;
+                                          return std::array<double, 3>{energy * q.current_volume(p), q.mass * q.x[p], q.mass * q.y[p]};
+                                      });
         total.strain_energy += s[0];
         total.moment[0] += s[1];
         total.moment[1] += s[2];
-        total.max_stress = std::max(total.max_stress, parallel_max(q.count, [&](std::size_t p) {
-            return std::max({std::abs(q.sxx[p]), std::abs(q.syy[p]), std::abs(q.sxy[p])});
-        }));
+        total.max_stress =
+            std::max(total.max_stress, parallel_max(q.count,
+                                                    [&](std::size_t p) {
+                                                        return std::max({std::abs(q.sxx[p]), std::abs(q.syy[p]), std::abs(q.sxy[p])});
+                                                    }));
     }
     return total;
 }
@@ -171,7 +175,8 @@ void Observer::sample_probes(double t)
             const Location at = where[probe.ids[n]];
             const Place here = place(at, probe.initial[n], t);
             const Vec2 v = solver_.velocity(at.body, at.point);
-            const auto add = [&](std::size_t k, const auto& values) {
+            const auto add = [&](std::size_t k, const auto& values)
+            {
                 for (std::size_t c = 0; c < values.size(); ++c)
                     mean[k][c] += values[c] / static_cast<double>(probe.ids.size());
             };
@@ -203,7 +208,8 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     file.attribute(group, "time", t);
     file.attribute(group, "step", step);
     snapshot_fields_.clear();
-    const auto write = [&](const char* name, const char* unit, std::size_t columns, auto&& row_of) {
+    const auto write = [&](const char* name, const char* unit, std::size_t columns, auto&& row_of)
+    {
         std::vector<double> values;
         values.reserve(where.size() * columns);
         for (std::size_t n = 0; n < where.size(); ++n)
@@ -222,7 +228,12 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     write("position", "m", 3, [](At, Here p) { return Row3{p.x, p.y, 0}; });
     write("initial_position", "m", 3, [](At, Here p) { return Row3{p.X, p.Y, 0}; });
     write("displacement", "m", 3, [](At, Here p) { return Row3{p.x - p.X, p.y - p.Y, 0}; });
-    write("velocity", "m/s", 3, [&](At at, Here) { const Vec2 v = solver_.velocity(at.body, at.point); return Row3{v[0], v[1], 0}; });
+    write("velocity", "m/s", 3,
+          [&](At at, Here)
+          {
+              const Vec2 v = solver_.velocity(at.body, at.point);
+              return Row3{v[0], v[1], 0};
+          });
     write("stress", "Pa", 6, [&](At at, Here) { return stress(at); });
     write("volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).current_volume(at.point)}; });
     write("initial_volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).initial_volume}; });
@@ -261,9 +272,11 @@ std::string Observer::xdmf(const std::string& name) const
                        "CollectionType=\"Temporal\">\n";
     for (std::size_t k = 0; k < snapshot_times_.size(); ++k)
     {
-        const auto item = [&](const std::string& field, std::size_t columns, const char* type = "Float") {
-            return fmt::format("<DataItem Format=\"HDF\" NumberType=\"{}\" Precision=\"{}\" Dimensions=\"{}{}\">{}:/snapshots/{:04}/{}</DataItem>",
-                               type, *type == 'F' ? 8 : 4, n, columns > 1 ? fmt::format(" {}", columns) : "", name, k, field);
+        const auto item = [&](const std::string& field, std::size_t columns, const char* type = "Float")
+        {
+            return fmt::format(
+                "<DataItem Format=\"HDF\" NumberType=\"{}\" Precision=\"{}\" Dimensions=\"{}{}\">{}:/snapshots/{:04}/{}</DataItem>", type,
+                *type == 'F' ? 8 : 4, n, columns > 1 ? fmt::format(" {}", columns) : "", name, k, field);
         };
         text += fmt::format("<Grid Name=\"{:04}\">\n<Time Value=\"{}\"/>\n<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{}\"/>\n"
                             "<Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
@@ -272,9 +285,15 @@ std::string Observer::xdmf(const std::string& name) const
         {
             const bool tensor = field.ends_with("stress"), scalar = field.ends_with("volume") || field == "mass";
             text += fmt::format("<Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", field,
-                                tensor ? "Tensor6" : scalar ? "Scalar" : "Vector", item(field, tensor ? 6 : scalar ? 1 : 3));
+                                tensor   ? "Tensor6"
+                                : scalar ? "Scalar"
+                                         : "Vector",
+                                item(field, tensor   ? 6
+                                            : scalar ? 1
+                                                     : 3));
         }
-        text += fmt::format("<Attribute Name=\"body\" AttributeType=\"Scalar\" Center=\"Node\">{}</Attribute>\n</Grid>\n", item("body", 1, "UInt"));
+        text += fmt::format("<Attribute Name=\"body\" AttributeType=\"Scalar\" Center=\"Node\">{}</Attribute>\n</Grid>\n",
+                            item("body", 1, "UInt"));
     }
     return text + "</Grid>\n</Domain>\n</Xdmf>\n";
 }

@@ -8,13 +8,13 @@ namespace testbed
 {
 struct Points
 {
-    Field<double> x{"x", "m"}, y{"y", "m"};                          ///< current position
-    Field<double> X{"X", "m"}, Y{"Y", "m"};                          ///< initial position, if a step needs it; else see the id
+    Field<double> x{"x", "m"}, y{"y", "m"};  ///< current position
+    Field<double> X{"X", "m"}, Y{"Y", "m"};  ///< initial position, if a step needs it; else see the id
     Field<double> sxx{"stress_xx", "Pa"}, syy{"stress_yy", "Pa"}, sxy{"stress_xy", "Pa"};
-    Field<double> volume{"volume", "m^2"};                           ///< current, per metre of thickness
+    Field<double> volume{"volume", "m^2"};                                   ///< current, per metre of thickness
     Field<double> half_x{"half_width_x", "m"}, half_y{"half_width_y", "m"};  ///< the point's own box, if it has one
-    Field<double> vx{"velocity_x", "m/s"}, vy{"velocity_y", "m/s"};  ///< MPM: the velocity lives on the points
-    Field<double> stiffness{"stiffness_ratio", "-"};                 ///< E(X, Y) / E of the material
+    Field<double> vx{"velocity_x", "m/s"}, vy{"velocity_y", "m/s"};          ///< MPM: the velocity lives on the points
+    Field<double> stiffness{"stiffness_ratio", "-"};                         ///< E(X, Y) / E of the material
     Field<std::uint32_t> id{"id", "-"};
 
     std::size_t count = 0;
@@ -25,8 +25,7 @@ struct Points
     template <class F>
     void for_each_field(F&& f)
     {
-        for (Field<double>* field :
-             {&x, &y, &X, &Y, &sxx, &syy, &sxy, &volume, &half_x, &half_y, &vx, &vy, &stiffness})
+        for (Field<double>* field : {&x, &y, &X, &Y, &sxx, &syy, &sxy, &volume, &half_x, &half_y, &vx, &vy, &stiffness})
             if (field->active())
                 f(*field);
         if (id.active())

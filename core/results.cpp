@@ -12,6 +12,8 @@ namespace testbed
 {
 namespace
 {
+constexpr const char* failed = "writing the result file failed (disk full?); nothing was kept";
+
 /// An HDF5 handle with the function that closes it.
 class Handle
 {
@@ -19,7 +21,7 @@ public:
     Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close)
     {
         if (id < 0)
-            throw OutputError("cannot write the result file (disk full?)");
+            throw OutputError(failed);
     }
     ~Handle() { close_(id_); }
     Handle(const Handle&) = delete;
@@ -34,7 +36,7 @@ private:
 void check(herr_t status)
 {
     if (status < 0)
-        throw OutputError("cannot write the result file (disk full?)");
+        throw OutputError(failed);
 }
 }  // namespace
 
@@ -86,12 +88,13 @@ struct ResultFile::Impl
         const bool closed = H5Fclose(file) >= 0;
         file = -1;
         if (!flushed || !closed)
-            throw OutputError("cannot write the result file (disk full?)");
+            throw OutputError(failed);
     }
 };
 
 ResultFile::ResultFile(const std::string& path) : impl_(std::make_unique<Impl>(Impl{path, path + ".part"}))
 {
+    H5dont_atexit();  // its clean-up crashes after a write that failed; every file is closed here
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     // the plain call first: it tells why, and HDF5 does not
     const int descriptor = ::open(impl_->part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
@@ -165,9 +168,9 @@ void ResultFile::commit()
         ::close(descriptor);
     if (!synced)
         throw OutputError(fmt::format("cannot write '{}': {}", impl_->part, std::strerror(errno)));
-    std::error_code failed;
-    std::filesystem::rename(impl_->part, impl_->path, failed);
-    if (failed)
-        throw OutputError(fmt::format("cannot write '{}': {}", impl_->path, failed.message()));
+    std::error_code error;
+    std::filesystem::rename(impl_->part, impl_->path, error);
+    if (error)
+        throw OutputError(fmt::format("cannot write '{}': {}", impl_->path, error.message()));
 }
 }  // namespace testbed

@@ -76,7 +76,8 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
     const double half = 0.5 * out.dt;
     double next_sample = 0, next_snapshot = 0, t = 0;
     Progress progress(!quiet, end);
-    const auto record = [&](bool last) {
+    const auto record = [&](bool last)
+    {
         const Stopwatch output;
         const bool sample = t + half >= next_sample || last, snapshot = t + half >= next_snapshot || last;
         if (sample || snapshot)
@@ -93,7 +94,8 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
         }
         out.output_seconds += output.seconds();
     };
-    const auto is_at_rest = [&] {
+    const auto is_at_rest = [&]
+    {
         const double tolerance = *scene.time.stop_unbalanced;
         solver.update_points();
         return solver.sums().unbalanced < tolerance && Observer::kinetic_ratio(solver) < tolerance &&
@@ -111,7 +113,8 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
             const bool last = out.steps >= total_steps || interrupted || limit || rest;
             record(last);
             if (interrupted)
-                out.status = "interrupted", out.code = ExitCode::interrupted, out.reason = fmt::format("stopped by the user at t = {:.6g} s", t);
+                out.status = "interrupted", out.code = ExitCode::interrupted,
+                out.reason = fmt::format("stopped by the user at t = {:.6g} s", t);
             else if (limit)
                 out.status = "time_limit", out.code = ExitCode::time_limit, out.reason = fmt::format("wall clock limit at t = {:.6g} s", t);
             if (last)
@@ -170,8 +173,7 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
     }
 }
 
-void write_performance(ResultFile& file, const Scene& scene, Solver& solver, const Outcome& out, double setup_seconds,
-                       std::size_t points)
+void write_performance(ResultFile& file, const Scene& scene, Solver& solver, const Outcome& out, double setup_seconds, std::size_t points)
 {
     const std::string group = "/performance";
     const double particle_steps = static_cast<double>(points) * static_cast<double>(out.steps);
@@ -204,7 +206,8 @@ Scene load_and_warn(const RunOptions& options)
 
 int guarded_main(const std::function<int()>& body)
 {
-    const auto fail = [](ExitCode code, const char* message) {
+    const auto fail = [](ExitCode code, const char* message)
+    {
         fmt::print(stderr, "error: {}\n", message);
         return static_cast<int>(code);
     };
@@ -246,7 +249,8 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
 
     catch_signals();
     const std::string output = options.output.empty() ? default_output(scene) : options.output;
-    const auto open = [&] {
+    const auto open = [&]
+    {
         try
         {
             return ResultFile(output);
@@ -272,9 +276,11 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
         throw OutputError(fmt::format("cannot write '{}'", xdmf_path.string()));
 
     if (!options.quiet)
-        fmt::print(stderr, "{} {}: {}{}{}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.1f} bytes per point; {}\n",
-                   scene.case_name(), variant_label(scene), out.status, out.reason.empty() ? "" : ": ", out.reason, points, out.steps, out.dt,
-                   out.solve_seconds, 1e-6 * static_cast<double>(points) * static_cast<double>(out.steps) / out.solve_seconds,
+        fmt::print(stderr,
+                   "{} {}: {}{}{}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.1f} bytes per "
+                   "point; {}\n",
+                   scene.case_name(), variant_label(scene), out.status, out.reason.empty() ? "" : ": ", out.reason, points, out.steps,
+                   out.dt, out.solve_seconds, 1e-6 * static_cast<double>(points) * static_cast<double>(out.steps) / out.solve_seconds,
                    static_cast<double>(solver->bytes()) / static_cast<double>(points), output);
     else if (out.code != ExitCode::completed)
         fmt::print(stderr, "{}: {}\n", out.status, out.reason);

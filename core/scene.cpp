@@ -57,8 +57,9 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
 std::string kind_of(const toml::node& node)
 {
     static const std::map<toml::node_type, const char*> names{
-        {toml::node_type::table, "table"},   {toml::node_type::array, "list"},      {toml::node_type::string, "string"},
-        {toml::node_type::integer, "integer"}, {toml::node_type::floating_point, "number"}, {toml::node_type::boolean, "boolean"}};
+        {toml::node_type::table, "table"},           {toml::node_type::array, "list"},
+        {toml::node_type::string, "string"},         {toml::node_type::integer, "integer"},
+        {toml::node_type::floating_point, "number"}, {toml::node_type::boolean, "boolean"}};
     const auto found = names.find(node.type());
     return found == names.end() ? "date or time" : found->second;
 }
@@ -68,7 +69,10 @@ class Reader
 {
 public:
     Reader(const toml::table& table, std::string path, Problems& problems, Constants& constants)
-        : table_(table), path_(std::move(path)), problems_(problems), constants_(constants)
+        : table_(table),
+          path_(std::move(path)),
+          problems_(problems),
+          constants_(constants)
     {
     }
     Reader(const Reader&) = delete;
@@ -129,9 +133,8 @@ public:
         std::vector<std::pair<std::string, const toml::node*>> waiting;
         for (const auto& [name, value] : *table)
             waiting.emplace_back(name.str(), &value);
-        std::stable_sort(waiting.begin(), waiting.end(), [](const auto& a, const auto& b) {
-            return a.second->source().begin.line < b.second->source().begin.line;
-        });
+        std::stable_sort(waiting.begin(), waiting.end(),
+                         [](const auto& a, const auto& b) { return a.second->source().begin.line < b.second->source().begin.line; });
         for (bool progress = true; progress && !waiting.empty();)
         {
             progress = false;
@@ -431,10 +434,7 @@ public:
     {
         optional(key, value, unit, doc);
     }
-    void choice(const char* key, std::string& value, const std::vector<std::string>&, const char* doc)
-    {
-        optional(key, value, "", doc);
-    }
+    void choice(const char* key, std::string& value, const std::vector<std::string>&, const char* doc) { optional(key, value, "", doc); }
     void expression(const char* key, std::string& value, const char* unit, const char* doc) { optional(key, value, unit, doc); }
     void named_numbers(const char* key, Constants& values, const char*)
     {
@@ -578,9 +578,8 @@ void set_override(toml::table& root, const std::string& assignment, Problems& pr
         value.insert_or_assign("v", text);  // a bare word is a string
     }
     // without a source position: messages then say that the value came by --set
-    const auto insert = [&](toml::table& into, const std::string& key) {
-        value.get("v")->visit([&](auto&& node) { into.insert_or_assign(key, node); });
-    };
+    const auto insert = [&](toml::table& into, const std::string& key)
+    { value.get("v")->visit([&](auto&& node) { into.insert_or_assign(key, node); }); };
     toml::table* table = &root;
     std::size_t begin = 0;
     while (true)
@@ -643,11 +642,13 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
     if (body.points_per_cell < 1 || body.points_per_cell > 64)
         problems.add(key + ".points_per_cell", fmt::format("between 1 and 64 per direction is asked, not {}", body.points_per_cell));
 
-    const auto refuse = [&](bool present, const char* name) {
+    const auto refuse = [&](bool present, const char* name)
+    {
         if (present)
             problems.add(key + "." + name, fmt::format("not used by shape '{}'", body.shape));
     };
-    const auto ask = [&](bool present, const char* name) {
+    const auto ask = [&](bool present, const char* name)
+    {
         if (!present)
             problems.add(key + "." + name, fmt::format("missing, shape '{}' needs it", body.shape));
         return present;
@@ -721,7 +722,8 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
 void check(const Scene& scene, Problems& problems)
 {
     const GridSpec& grid = scene.grid;
-    const auto positive = [&](double v, const std::string& key) {
+    const auto positive = [&](double v, const std::string& key)
+    {
         if (!(v > 0))
             problems.add(key, fmt::format("must be positive, not {}", v));
     };
@@ -819,7 +821,8 @@ Constants Scene::expression_constants() const
 
 std::optional<std::string> nearest(const std::string& word, const std::vector<std::string>& candidates)
 {
-    const auto distance = [](const std::string& a, const std::string& b) {
+    const auto distance = [](const std::string& a, const std::string& b)
+    {
         std::vector<std::size_t> row(b.size() + 1);
         for (std::size_t j = 0; j <= b.size(); ++j)
             row[j] = j;
@@ -850,7 +853,8 @@ std::optional<std::string> nearest(const std::string& word, const std::vector<st
 LoadedScene load_scene(const std::string& path, const std::string& method, const std::vector<std::string>& overrides)
 {
     Problems problems(path);
-    const auto throw_if_any = [&] {
+    const auto throw_if_any = [&]
+    {
         if (!problems.errors().empty())
             throw SceneError(fmt::format("{}", fmt::join(problems.errors(), "\n")));
     };
@@ -925,15 +929,22 @@ const std::vector<Variant>& variants()
 {
     static const std::vector<Variant> list{
         {"lpfdm-2000", "lpfdm", "as published: a point belongs to one cell, upwind convection, no hourglass control",
-         [](Scene& s) { s.lpfdm = {"point", "upwind", "extrapolate", 0.0}; }},
-        {"lpfdm", "lpfdm", "each point has a domain, central convection, hourglass control",
-         [](Scene& s) { s.lpfdm = LpfdmSpec{}; }},
+         [](Scene& s) {
+             s.lpfdm = {"point", "upwind", "extrapolate", 0.0};
+         }},
+        {"lpfdm", "lpfdm", "each point has a domain, central convection, hourglass control", [](Scene& s) { s.lpfdm = LpfdmSpec{}; }},
         {"mpm-linear", "mpm", "linear shape functions, strain at each point, FLIP, MUSL",
-         [](Scene& s) { s.mpm = {"linear", "musl", "four_point", 1.0}; }},
+         [](Scene& s) {
+             s.mpm = {"linear", "musl", "four_point", 1.0};
+         }},
         {"mpm-linear-bbar", "mpm", "linear shape functions, volumetric strain averaged over each cell, FLIP, MUSL",
-         [](Scene& s) { s.mpm = {"linear", "musl", "b_bar", 1.0}; }},
+         [](Scene& s) {
+             s.mpm = {"linear", "musl", "b_bar", 1.0};
+         }},
         {"mpm-cpgimp", "mpm", "contiguous-particle GIMP: each point's box stretches with it; FLIP, MUSL",
-         [](Scene& s) { s.mpm = {"cpgimp", "musl", "four_point", 1.0}; }},
+         [](Scene& s) {
+             s.mpm = {"cpgimp", "musl", "four_point", 1.0};
+         }},
         {"fem-q1", "fem", "small-strain reference, bilinear elements", [](Scene& s) { s.fem.degree = 1; }},
         {"fem-q2", "fem", "small-strain reference, biquadratic elements", [](Scene& s) { s.fem.degree = 2; }},
     };
@@ -953,7 +964,8 @@ std::string variant_label(const Scene& scene)
     const Variant& variant = find_variant(scene.method);
     Scene preset;
     variant.apply(preset);
-    const auto lines = [&](Scene s) {
+    const auto lines = [&](Scene s)
+    {
         Writer writer;
         if (variant.family == "lpfdm")
             s.lpfdm.describe(writer);

@@ -40,8 +40,9 @@ struct TimeSpec
         v.required("end", end, "s", "the run completes at this time");
         v.optional("cfl", cfl, "-", "time step as a share of the critical one");
         v.optional("dt", dt, "s", "time step; replaces cfl");
-        v.optional("stop_unbalanced", stop_unbalanced, "-",
-                   "the run completes earlier, when unbalanced over internal nodal forces and kinetic over strain energy are both below this");
+        v.optional(
+            "stop_unbalanced", stop_unbalanced, "-",
+            "the run completes earlier, when unbalanced over internal nodal forces and kinetic over strain energy are both below this");
         v.optional("wall_clock_limit", wall_clock_limit, "s", "the run stops with status time_limit");
     }
 };

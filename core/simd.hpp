@@ -22,10 +22,7 @@ struct AllLanes
 class SomeLanes
 {
 public:
-    explicit SomeLanes(std::size_t count)
-        : mask_(Pack([](auto i) { return static_cast<double>(i); }) < Pack(static_cast<double>(count)))
-    {
-    }
+    explicit SomeLanes(std::size_t count) : mask_(Pack([](auto i) { return static_cast<double>(i); }) < Pack(static_cast<double>(count))) {}
     static Pack load(const double* from) { return Pack(from, stdx::element_aligned); }
     void store(double* to, Pack v) const { stdx::where(mask_, v).copy_to(to, stdx::element_aligned); }
     Pack keep(Pack v) const

@@ -20,14 +20,16 @@ struct MotionSums
 /// Sums over nodes whose velocity is `lag` seconds behind their forces. @param internal norm of the internal nodal forces
 inline MotionSums nodal_sums(const Lattice& lattice, const Nodes& nodes, double lag, double internal)
 {
-    const auto s = ordered_sum<4>(nodes.active.size(), [&](std::size_t a) {
-        const std::size_t i = nodes.active[a];
-        const Vec2 x = lattice.node_position(i);
-        const double m = nodes.mass[i], step = inverse_mass(nodes, i) * lag;
-        const double vx = nodes.vx[i] + nodes.fx[i] * step, vy = nodes.vy[i] + nodes.fy[i] * step;
-        return std::array<double, 4>{0.5 * m * (vx * vx + vy * vy), m * vx, m * vy,
-                                     m * ((x[0] - lattice.origin[0]) * vy - (x[1] - lattice.origin[1]) * vx)};
-    });
+    const auto s = ordered_sum<4>(nodes.active.size(),
+                                  [&](std::size_t a)
+                                  {
+                                      const std::size_t i = nodes.active[a];
+                                      const Vec2 x = lattice.node_position(i);
+                                      const double m = nodes.mass[i], step = inverse_mass(nodes, i) * lag;
+                                      const double vx = nodes.vx[i] + nodes.fx[i] * step, vy = nodes.vy[i] + nodes.fy[i] * step;
+                                      return std::array<double, 4>{0.5 * m * (vx * vx + vy * vy), m * vx, m * vy,
+                                                                   m * ((x[0] - lattice.origin[0]) * vy - (x[1] - lattice.origin[1]) * vx)};
+                                  });
     return {s[0], {s[1], s[2]}, s[3], internal > 0 ? force_norm(nodes) / internal : 0};
 }
 
@@ -60,11 +62,11 @@ public:
     virtual const std::vector<Body>& bodies() const = 0;
     /// Velocity of a point, at the half step before the last prepare().
     virtual Vec2 velocity(std::size_t body, std::size_t point) const = 0;
-    virtual std::size_t unknowns() const = 0;       ///< nodal unknowns that carry mass
+    virtual std::size_t unknowns() const = 0;  ///< nodal unknowns that carry mass
     virtual std::size_t active_cells() const = 0;
-    virtual std::size_t bytes() = 0;                ///< of all arrays
+    virtual std::size_t bytes() = 0;  ///< of all arrays
     virtual const PhaseTimer& timer() const = 0;
-    virtual const char* kinematics() const = 0;     ///< which [exact.*] applies
+    virtual const char* kinematics() const = 0;  ///< which [exact.*] applies
     /// What time.cfl is a share of: the stability limit, or for an implicit method what it would be about [s].
     virtual double critical_time_step(const Scene& scene) { return testbed::critical_time_step(scene); }
     /// One implicit step to the end instead of many explicit ones.

@@ -46,7 +46,9 @@ struct BinFrame
     double scale, x0, y0;  ///< 1/L; bin corner in cells from the coordinate origin
 
     BinFrame(const Lattice& lattice, const Bin& bin)
-        : scale(1 / lattice.cell_size), x0(lattice.origin[0] * scale + bin.i), y0(lattice.origin[1] * scale + bin.j)
+        : scale(1 / lattice.cell_size),
+          x0(lattice.origin[0] * scale + bin.i),
+          y0(lattice.origin[1] * scale + bin.j)
     {
     }
 
@@ -108,24 +110,28 @@ void spread(const Lattice& lattice, const Body& body, std::size_t first_bin, std
 {
     constexpr int S = Support::S;
     const auto& bins = body.bins.list();
-    parallel_for(bins.size(), [&](std::size_t b) {
-        std::array<Pack, S * S * Q> total{};
-        const BinFrame frame(lattice, bins[b]);
-        for_each_pack(bins[b].begin, bins[b].end, [&](std::size_t p, const auto& lanes) {
-            const Corner c = frame.corner<Support>(body.points, p, lanes);
-            const auto wx = Support::weights(c.ax, c.wx), wy = Support::weights(c.ay, c.wy);
-            const std::array<Pack, Q> value = quantities(p, lanes);
-            for (int j = 0; j < S; ++j)
-                for (int i = 0; i < S; ++i)
-                {
-                    const Pack w = lanes.keep(wx[i] * wy[j]);
-                    for (std::size_t k = 0; k < Q; ++k)
-                        total[(j * S + i) * Q + k] += w * value[k];
-                }
-        });
-        double* to = &partial[(first_bin + b) * S * S * Q];
-        for (std::size_t k = 0; k < total.size(); ++k)
-            to[k] = sum(total[k]);
-    });
+    parallel_for(bins.size(),
+                 [&](std::size_t b)
+                 {
+                     std::array<Pack, S * S * Q> total{};
+                     const BinFrame frame(lattice, bins[b]);
+                     for_each_pack(bins[b].begin, bins[b].end,
+                                   [&](std::size_t p, const auto& lanes)
+                                   {
+                                       const Corner c = frame.corner<Support>(body.points, p, lanes);
+                                       const auto wx = Support::weights(c.ax, c.wx), wy = Support::weights(c.ay, c.wy);
+                                       const std::array<Pack, Q> value = quantities(p, lanes);
+                                       for (int j = 0; j < S; ++j)
+                                           for (int i = 0; i < S; ++i)
+                                           {
+                                               const Pack w = lanes.keep(wx[i] * wy[j]);
+                                               for (std::size_t k = 0; k < Q; ++k)
+                                                   total[(j * S + i) * Q + k] += w * value[k];
+                                           }
+                                   });
+                     double* to = &partial[(first_bin + b) * S * S * Q];
+                     for (std::size_t k = 0; k < total.size(); ++k)
+                         to[k] = sum(total[k]);
+                 });
 }
 }  // namespace testbed

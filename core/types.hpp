@@ -23,8 +23,8 @@ struct Gradient
     T xx{}, yy{}, xy{}, yx{};
 
     T trace() const { return xx + yy; }
-    T shear() const { return xy + yx; }                   ///< engineering shear, eq. (5e)
-    T rotation() const { return T(0.5) * (yx - xy); }     ///< anticlockwise, eq. (5f)
+    T shear() const { return xy + yx; }                ///< engineering shear, eq. (5e)
+    T rotation() const { return T(0.5) * (yx - xy); }  ///< anticlockwise, eq. (5f)
 };
 
 template <class T>

@@ -70,7 +70,8 @@ private:
 }  // namespace
 
 Elasticity::Elasticity(const Scene& scene, const Lattice& lattice, const Warn& warn)
-    : scene_(scene), element_(dealii::FE_Q<2>(static_cast<unsigned int>(scene.fem.degree)), 2)
+    : scene_(scene),
+      element_(dealii::FE_Q<2>(static_cast<unsigned int>(scene.fem.degree)), 2)
 {
     make_mesh(scene, lattice, warn, mesh_);
     dofs_.reinit(mesh_);
@@ -301,11 +302,14 @@ MotionSums Elasticity::motion(const Vector& velocity) const
         momentum.scale(lumped_mass_);
     else if (!consistent_mass_.empty())
         consistent_mass_.vmult(momentum, velocity);
-    const auto s = ordered_sum<4>(velocity.size(), [&](std::size_t dof) {
-        const double p = momentum(dof);
-        const Vec2 arm{nodes_[dof][0] - scene_.grid.origin[0], nodes_[dof][1] - scene_.grid.origin[1]};
-        return std::array<double, 4>{0.5 * p * velocity(dof), is_x(dof) ? p : 0, is_x(dof) ? 0 : p, is_x(dof) ? -arm[1] * p : arm[0] * p};
-    });
+    const auto s = ordered_sum<4>(velocity.size(),
+                                  [&](std::size_t dof)
+                                  {
+                                      const double p = momentum(dof);
+                                      const Vec2 arm{nodes_[dof][0] - scene_.grid.origin[0], nodes_[dof][1] - scene_.grid.origin[1]};
+                                      return std::array<double, 4>{0.5 * p * velocity(dof), is_x(dof) ? p : 0, is_x(dof) ? 0 : p,
+                                                                   is_x(dof) ? -arm[1] * p : arm[0] * p};
+                                  });
     return {s[0], {s[1], s[2]}, s[3], 0};
 }
 

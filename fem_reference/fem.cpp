@@ -125,12 +125,14 @@ public:
         try
         {
             timer_("factorisation", [&] { factorise(); });
-            timer_("solve", [&] {
-                displacement_ = load_;
-                elasticity_.hold(displacement_);
-                factors_.solve(displacement_);
-                elasticity_.hold(displacement_);
-            });
+            timer_("solve",
+                   [&]
+                   {
+                       displacement_ = load_;
+                       elasticity_.hold(displacement_);
+                       factors_.solve(displacement_);
+                       elasticity_.hold(displacement_);
+                   });
         }
         catch (const dealii::ExceptionBase&)
         {
@@ -169,17 +171,21 @@ public:
 
     void advance(double dt) override
     {
-        timer_("predictor", [&] {
-            displacement_.add(dt, velocity_, 0.25 * dt * dt, acceleration_);
-            velocity_.add(0.5 * dt, acceleration_);
-            load_ = elasticity_.load(time_ + dt);
-            acceleration_ = imbalance();
-            acceleration_ *= 4 / (dt * dt);
-        });
-        timer_("solve", [&] {
-            factors_.solve(acceleration_);
-            elasticity_.hold(acceleration_);
-        });
+        timer_("predictor",
+               [&]
+               {
+                   displacement_.add(dt, velocity_, 0.25 * dt * dt, acceleration_);
+                   velocity_.add(0.5 * dt, acceleration_);
+                   load_ = elasticity_.load(time_ + dt);
+                   acceleration_ = imbalance();
+                   acceleration_ *= 4 / (dt * dt);
+               });
+        timer_("solve",
+               [&]
+               {
+                   factors_.solve(acceleration_);
+                   elasticity_.hold(acceleration_);
+               });
         displacement_.add(0.25 * dt * dt, acceleration_);
         velocity_.add(0.5 * dt, acceleration_);
     }
@@ -248,11 +254,13 @@ private:
         if (dt != checked_dt_)
             check(dt);
         timer_("loads", [&] { load_ = elasticity_.load(t); });
-        timer_("internal forces, acceleration", [&] {
-            acceleration_ = imbalance();
-            for (std::size_t dof = 0; dof < acceleration_.size(); ++dof)
-                acceleration_(dof) /= elasticity_.lumped_mass()(dof);
-        });
+        timer_("internal forces, acceleration",
+               [&]
+               {
+                   acceleration_ = imbalance();
+                   for (std::size_t dof = 0; dof < acceleration_.size(); ++dof)
+                       acceleration_(dof) /= elasticity_.lumped_mass()(dof);
+               });
         lag_ = started_ ? 0.5 * dt : 0;
     }
     void check(double dt)

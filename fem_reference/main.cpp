@@ -19,12 +19,15 @@ int run(int argc, char** argv)
     {
         return app.exit(e) == 0 ? 0 : static_cast<int>(ExitCode::bad_scene);
     }
-    return static_cast<int>(run_scene(options, [&](const Scene& scene) {
-        if (find_variant(scene.method).family != "fem")
-            throw SceneError(scene.path + ": method '" + scene.method + "' is not an FEM one; add --method fem-q2");
-        const auto refuse = [&](const std::string& message) { throw SceneError(scene.path + ": " + message); };
-        return make_fem(scene, options.strict ? Warn(refuse) : Warn());
-    }));
+    return static_cast<int>(
+        run_scene(options,
+                  [&](const Scene& scene)
+                  {
+                      if (find_variant(scene.method).family != "fem")
+                          throw SceneError(scene.path + ": method '" + scene.method + "' is not an FEM one; add --method fem-q2");
+                      const auto refuse = [&](const std::string& message) { throw SceneError(scene.path + ": " + message); };
+                      return make_fem(scene, options.strict ? Warn(refuse) : Warn());
+                  }));
 }
 }  // namespace
 }  // namespace testbed

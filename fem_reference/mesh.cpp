@@ -55,8 +55,8 @@ std::vector<Cell> covered_cells(const Scene& scene, const BodySpec& body, const 
         cells.emplace_back(j, i);
     }
     if (cells.empty())
-        throw SceneError(fmt::format("{}: body '{}' holds the centre of no lattice cell; make grid.cell_size smaller", scene.path,
-                                     body.name));
+        throw SceneError(
+            fmt::format("{}: body '{}' holds the centre of no lattice cell; make grid.cell_size smaller", scene.path, body.name));
     return cells;
 }
 
@@ -107,7 +107,8 @@ void make_mesh(const Scene& scene, const Lattice& lattice, const Warn& warn, dea
 {
     std::vector<dealii::Point<2>> vertices;
     std::map<Cell, unsigned int> vertex_at;
-    const auto vertex = [&](int j, int i) {
+    const auto vertex = [&](int j, int i)
+    {
         const auto [at, is_new] = vertex_at.emplace(Cell{j, i}, static_cast<unsigned int>(vertices.size()));
         if (is_new)
             vertices.emplace_back(lattice.origin[0] + i * lattice.cell_size, lattice.origin[1] + j * lattice.cell_size);

@@ -82,8 +82,8 @@ std::pair<int, int> Sampler::cell_of(const Vec2& place, unsigned int body) const
 
 std::uint32_t Sampler::pattern_at(const dealii::Point<2>& unit, const dealii::FiniteElement<2>& element, Patterns& known)
 {
-    const auto [at, is_new] = known.emplace(std::pair{std::llround(1e9 * unit[0]), std::llround(1e9 * unit[1])},
-                                            static_cast<std::uint32_t>(patterns_.size()));
+    const auto [at, is_new] =
+        known.emplace(std::pair{std::llround(1e9 * unit[0]), std::llround(1e9 * unit[1])}, static_cast<std::uint32_t>(patterns_.size()));
     if (is_new)
     {
         Pattern& pattern = patterns_.emplace_back();
@@ -104,25 +104,27 @@ void Sampler::sample(const Vector& displacement, std::vector<Body>& bodies) cons
     {
         Points& q = bodies[b].points;
         const ElasticModuli base = moduli(bodies[b].material);
-        parallel_for(q.count, [&](std::size_t p) {
-            const auto [cell, pattern] = locations_[b][p];
-            const Pattern& at = patterns_[pattern];
-            const std::uint32_t* dof = &dofs_[2 * shapes_ * cell];
-            Vec2 u{0, 0};
-            Gradient<> d;
-            for (std::size_t k = 0; k < shapes_; ++k)
-            {
-                const double ux = displacement(dof[2 * k]), uy = displacement(dof[2 * k + 1]);
-                u = {u[0] + at.value[k] * ux, u[1] + at.value[k] * uy};
-                d = d + Gradient<>{at.dx[k] * ux, at.dy[k] * uy, at.dy[k] * ux, at.dx[k] * uy};
-            }
-            const SymTensor<> stress = elastic_stress(base, d, q.stiffness.active() ? q.stiffness[p] : 1.0);
-            q.x[p] = q.X[p] + u[0];
-            q.y[p] = q.Y[p] + u[1];
-            q.sxx[p] = stress.xx;
-            q.syy[p] = stress.yy;
-            q.sxy[p] = stress.xy;
-        });
+        parallel_for(q.count,
+                     [&](std::size_t p)
+                     {
+                         const auto [cell, pattern] = locations_[b][p];
+                         const Pattern& at = patterns_[pattern];
+                         const std::uint32_t* dof = &dofs_[2 * shapes_ * cell];
+                         Vec2 u{0, 0};
+                         Gradient<> d;
+                         for (std::size_t k = 0; k < shapes_; ++k)
+                         {
+                             const double ux = displacement(dof[2 * k]), uy = displacement(dof[2 * k + 1]);
+                             u = {u[0] + at.value[k] * ux, u[1] + at.value[k] * uy};
+                             d = d + Gradient<>{at.dx[k] * ux, at.dy[k] * uy, at.dy[k] * ux, at.dx[k] * uy};
+                         }
+                         const SymTensor<> stress = elastic_stress(base, d, q.stiffness.active() ? q.stiffness[p] : 1.0);
+                         q.x[p] = q.X[p] + u[0];
+                         q.y[p] = q.Y[p] + u[1];
+                         q.sxx[p] = stress.xx;
+                         q.syy[p] = stress.yy;
+                         q.sxy[p] = stress.xy;
+                     });
     }
 }
 

@@ -47,12 +47,14 @@ void convect(LpfdmGrid& grid, double dt)
 {
     const double courant = dt / grid.lattice.cell_size;
     const auto limited = [&](double v) { return std::fmin(1.0, std::fmax(-1.0, v * courant)); };
-    grid.for_each_node([&](std::size_t i, std::size_t first_cell) {
-        double &vx = grid.nodes.vx[i], &vy = grid.nodes.vy[i];
-        const Gradient<> g = Scheme::gradient(grid, first_cell, limited(vx), limited(vy));
-        const double dx = vx * g.xx + vy * g.xy, dy = vx * g.yx + vy * g.yy;
-        vx -= dx;
-        vy -= dy;
-    });
+    grid.for_each_node(
+        [&](std::size_t i, std::size_t first_cell)
+        {
+            double &vx = grid.nodes.vx[i], &vy = grid.nodes.vy[i];
+            const Gradient<> g = Scheme::gradient(grid, first_cell, limited(vx), limited(vy));
+            const double dx = vx * g.xx + vy * g.xy, dy = vx * g.yx + vy * g.yy;
+            vx -= dx;
+            vy -= dy;
+        });
 }
 }  // namespace testbed

@@ -88,9 +88,6 @@ struct LpfdmGrid
             uy[k] = nodes.vy[corner(first, k)];
         }
     }
-    std::size_t bytes() const
-    {
-        return cells.bytes() + nodes.bytes() + gather.bytes() + first_cell.capacity() * sizeof(std::uint32_t);
-    }
+    std::size_t bytes() const { return cells.bytes() + nodes.bytes() + gather.bytes() + first_cell.capacity() * sizeof(std::uint32_t); }
 };
 }  // namespace testbed

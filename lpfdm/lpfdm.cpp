@@ -29,7 +29,8 @@ public:
         if (options_.hourglass > 0)
             hourglass_.resize(grid_.lattice.cells());
         for (const Body& body : bodies_)
-            wave_speed_ = std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
+            wave_speed_ =
+                std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
         rebuild();
         cell_averages<Support>(grid_, bodies_, workspace_);
         set_initial_velocity(scene);
@@ -37,39 +38,52 @@ public:
 
     void prepare(double t, double dt) override
     {
-        timer_("bins", [&] { if (moved_) rebuild(); });
+        timer_("bins",
+               [&]
+               {
+                   if (moved_)
+                       rebuild();
+               });
         timer_("cell averages (7)(8)", [&] { cell_averages<Support>(grid_, bodies_, workspace_); });
         timer_("nodal forces (9)(10)", [&] { nodal_forces(grid_); });
-        timer_("convection (13)", [&] {
-            extend_to_frontier();
-            convect_velocity(dt);
-            node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
-        });
+        timer_("convection (13)",
+               [&]
+               {
+                   extend_to_frontier();
+                   convect_velocity(dt);
+                   node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
+               });
         if (!hourglass_.empty())
             timer_("hourglass", [&] { resist_hourglass(grid_, options_.hourglass * wave_speed_ / grid_.lattice.cell_size, hourglass_); });
         internal_ = force_norm(nodes_);
-        timer_("node operations (11)(15)", [&] {
-            if (body_force_)
-                add_body_force(t);
-            node_ops_.apply_forces(nodes_, t);
-            node_ops_.apply_fixities(nodes_.fx, nodes_.fy);
-        });
+        timer_("node operations (11)(15)",
+               [&]
+               {
+                   if (body_force_)
+                       add_body_force(t);
+                   node_ops_.apply_forces(nodes_, t);
+                   node_ops_.apply_fixities(nodes_.fx, nodes_.fy);
+               });
         lag_ = started_ ? 0.5 * dt : 0;
     }
 
     void advance(double dt) override
     {
         // the given initial velocity is that of t = 0: the first kick is half a step
-        timer_("acceleration (12)(14)", [&] {
-            accelerate(nodes_, started_ ? dt : 0.5 * dt);
-            node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
-        });
+        timer_("acceleration (12)(14)",
+               [&]
+               {
+                   accelerate(nodes_, started_ ? dt : 0.5 * dt);
+                   node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
+               });
         started_ = true;
         timer_("cell strain (5)", [&] { cell_gradients(grid_, dt); });
-        timer_("points (6), material", [&] {
-            for (Body& body : bodies_)
-                moved_ |= std::visit([&](const auto& law) { return move_points<Support>(grid_, body, law, dt); }, body.material);
-        });
+        timer_("points (6), material",
+               [&]
+               {
+                   for (Body& body : bodies_)
+                       moved_ |= std::visit([&](const auto& law) { return move_points<Support>(grid_, body, law, dt); }, body.material);
+               });
     }
 
     MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, lag_, internal_); }
@@ -80,7 +94,8 @@ public:
     Vec2 velocity(std::size_t body, std::size_t p) const override
     {
         const Points& q = bodies_[body].points;
-        const double cx = (q.x[p] - grid_.lattice.origin[0]) / grid_.lattice.cell_size, cy = (q.y[p] - grid_.lattice.origin[1]) / grid_.lattice.cell_size;
+        const double cx = (q.x[p] - grid_.lattice.origin[0]) / grid_.lattice.cell_size,
+                     cy = (q.y[p] - grid_.lattice.origin[1]) / grid_.lattice.cell_size;
         if (!(cx >= 0 && cx < grid_.lattice.nx && cy >= 0 && cy < grid_.lattice.ny))
             return {0, 0};
         const int i = static_cast<int>(cx), j = static_cast<int>(cy);
@@ -139,7 +154,8 @@ private:
             }
         for (const auto n : left_)
             nodes_.mass[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
-        const auto update = [&](std::uint32_t n) {
+        const auto update = [&](std::uint32_t n)
+        {
             was_active_[n] = nodes_.mass[n] > 0;
             if (!was_active_[n])
                 nodes_.vx[n] = nodes_.vy[n] = 0;
@@ -185,14 +201,16 @@ private:
     {
         body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather, t,
                                              [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
-        grid_.for_each_node([&](std::size_t i, std::size_t first_cell) {
-            for (int k = 0; k < 4; ++k)
-                if (const std::size_t c = grid_.around(first_cell, k); grid_.cells.mass[c] > 0)
-                {
-                    nodes_.fx[i] += 0.25 * cell_force_[c][0];
-                    nodes_.fy[i] += 0.25 * cell_force_[c][1];
-                }
-        });
+        grid_.for_each_node(
+            [&](std::size_t i, std::size_t first_cell)
+            {
+                for (int k = 0; k < 4; ++k)
+                    if (const std::size_t c = grid_.around(first_cell, k); grid_.cells.mass[c] > 0)
+                    {
+                        nodes_.fx[i] += 0.25 * cell_force_[c][0];
+                        nodes_.fy[i] += 0.25 * cell_force_[c][1];
+                    }
+            });
     }
 
     /// Nodes start with the bodies' velocity at their own position, weighted by the mass that each body gives them.

@@ -17,7 +17,8 @@ class Mpm final : public Solver
 public:
     explicit Mpm(const Scene& scene)
         : lattice_(make_lattice(scene.grid)),
-          bodies_(make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true, .initial_position = scene.body_force.has_value()})),
+          bodies_(
+              make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true, .initial_position = scene.body_force.has_value()})),
           node_ops_(make_node_ops(scene, lattice_)),
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
@@ -30,7 +31,12 @@ public:
 
     void prepare(double t, double dt) override
     {
-        timer_("bins", [&] { if (moved_) rebuild(); });
+        timer_("bins",
+               [&]
+               {
+                   if (moved_)
+                       rebuild();
+               });
         if (options_.scheme == "usf")
         {
             timer_("points to nodes", [&] { points_to_nodes<Scatter::momentum>(); });
@@ -41,15 +47,19 @@ public:
         else
             timer_("points to nodes", [&] { points_to_nodes<Scatter::momentum_and_force>(); });
         internal_ = force_norm(nodes_);
-        timer_("node operations", [&] {
-            if (body_force_)
-                body_force_->template apply<Shape>(lattice_, bodies_, gather_, t, [&](std::size_t n, const std::array<double, 2>& f) {
-                    nodes_.fx[n] += f[0];
-                    nodes_.fy[n] += f[1];
-                });
-            node_ops_.apply_forces(nodes_, t);
-            node_ops_.apply_fixities(nodes_.fx, nodes_.fy);
-        });
+        timer_("node operations",
+               [&]
+               {
+                   if (body_force_)
+                       body_force_->template apply<Shape>(lattice_, bodies_, gather_, t,
+                                                          [&](std::size_t n, const std::array<double, 2>& f)
+                                                          {
+                                                              nodes_.fx[n] += f[0];
+                                                              nodes_.fy[n] += f[1];
+                                                          });
+                   node_ops_.apply_forces(nodes_, t);
+                   node_ops_.apply_fixities(nodes_.fx, nodes_.fy);
+               });
         lag_ = started_ ? 0.5 * dt : 0;
     }
 
@@ -61,11 +71,13 @@ public:
         timer_("nodes to points", [&] { update_velocity(); });
         if (options_.scheme == "musl")
         {
-            timer_("remap velocity", [&] {
-                carrier_x_ = nodes_.vx;
-                carrier_y_ = nodes_.vy;
-                points_to_nodes<Scatter::momentum>();
-            });
+            timer_("remap velocity",
+                   [&]
+                   {
+                       carrier_x_ = nodes_.vx;
+                       carrier_y_ = nodes_.vy;
+                       points_to_nodes<Scatter::momentum>();
+                   });
             timer_("points, material", [&] { move_points<true>(carrier_x_, carrier_y_, dt); });
         }
         else if (options_.scheme == "usl")
@@ -88,7 +100,8 @@ public:
     std::size_t bytes() override
     {
         return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() +
-               (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity()) * sizeof(double) + (body_force_ ? body_force_->bytes() : 0);
+               (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity()) * sizeof(double) +
+               (body_force_ ? body_force_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
     const char* kinematics() const override { return "hypoelastic"; }
@@ -121,34 +134,38 @@ private:
             scatter<Shape, Strain, what>(lattice_, body, first_bin, workspace_);
             first_bin += body.bins.list().size();
         }
-        gather_.sum<Q>(workspace_, [&](std::size_t i, const std::array<double, Q>& s) {
-            if constexpr (what != Scatter::force)
-            {
-                nodes_.mass[i] = s[0];
-                const double inverse = inverse_mass(nodes_, i);
-                nodes_.vx[i] = s[1] * inverse;
-                nodes_.vy[i] = s[2] * inverse;
-            }
-            if constexpr (what != Scatter::momentum)
-            {
-                nodes_.fx[i] = s[Q - 2];
-                nodes_.fy[i] = s[Q - 1];
-            }
-        });
+        gather_.sum<Q>(workspace_,
+                       [&](std::size_t i, const std::array<double, Q>& s)
+                       {
+                           if constexpr (what != Scatter::force)
+                           {
+                               nodes_.mass[i] = s[0];
+                               const double inverse = inverse_mass(nodes_, i);
+                               nodes_.vx[i] = s[1] * inverse;
+                               nodes_.vy[i] = s[2] * inverse;
+                           }
+                           if constexpr (what != Scatter::momentum)
+                           {
+                               nodes_.fx[i] = s[Q - 2];
+                               nodes_.fy[i] = s[Q - 1];
+                           }
+                       });
         node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
     }
 
     /// v += F / m dt; from here on the force holds the increment of the velocity.
     void accelerate_and_keep_increment(double dt)
     {
-        parallel_for(nodes_.active.size(), [&](std::size_t a) {
-            const std::size_t i = nodes_.active[a];
-            const double step = inverse_mass(nodes_, i) * dt;
-            nodes_.fx[i] *= step;
-            nodes_.fy[i] *= step;
-            nodes_.vx[i] += nodes_.fx[i];
-            nodes_.vy[i] += nodes_.fy[i];
-        });
+        parallel_for(nodes_.active.size(),
+                     [&](std::size_t a)
+                     {
+                         const std::size_t i = nodes_.active[a];
+                         const double step = inverse_mass(nodes_, i) * dt;
+                         nodes_.fx[i] *= step;
+                         nodes_.fy[i] *= step;
+                         nodes_.vx[i] += nodes_.fx[i];
+                         nodes_.vy[i] += nodes_.fy[i];
+                     });
         node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
     }
 
@@ -158,7 +175,8 @@ private:
     {
         for (Body& body : bodies_)
             std::visit(
-                [&](const auto& law) {
+                [&](const auto& law)
+                {
                     const auto& bins = body.bins.list();
                     parallel_for(bins.size(), [&](std::size_t b) { kernel(body, law, bins[b], BinFrame(lattice_, bins[b])); });
                 },
@@ -169,37 +187,45 @@ private:
     void update_velocity()
     {
         const Pack flip(options_.flip), pic(1 - options_.flip);
-        for_each_bin([&](Body& body, const auto&, const Bin& bin, const BinFrame& frame) {
-            Points& q = body.points;
-            const NodalVelocity<S> increment(lattice_, bin, nodes_.fx, nodes_.fy), total(lattice_, bin, nodes_.vx, nodes_.vy);
-            for_each_pack(bin.begin, bin.end, [&](std::size_t p, const auto& lanes) {
-                const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                const auto dv = increment.at(at);
-                Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
-                if (options_.flip < 1)
-                {
-                    const auto v = total.at(at);
-                    vx = flip * vx + pic * v[0];
-                    vy = flip * vy + pic * v[1];
-                }
-                lanes.store(&q.vx[p], vx);
-                lanes.store(&q.vy[p], vy);
+        for_each_bin(
+            [&](Body& body, const auto&, const Bin& bin, const BinFrame& frame)
+            {
+                Points& q = body.points;
+                const NodalVelocity<S> increment(lattice_, bin, nodes_.fx, nodes_.fy), total(lattice_, bin, nodes_.vx, nodes_.vy);
+                for_each_pack(bin.begin, bin.end,
+                              [&](std::size_t p, const auto& lanes)
+                              {
+                                  const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
+                                  const auto dv = increment.at(at);
+                                  Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
+                                  if (options_.flip < 1)
+                                  {
+                                      const auto v = total.at(at);
+                                      vx = flip * vx + pic * v[0];
+                                      vy = flip * vy + pic * v[1];
+                                  }
+                                  lanes.store(&q.vx[p], vx);
+                                  lanes.store(&q.vy[p], vy);
+                              });
             });
-        });
     }
 
     /// Stress alone, with the nodal velocity (USF).
     void update_stress(double dt)
     {
-        for_each_bin([&](Body& body, const auto& law, const Bin& bin, const BinFrame& frame) {
-            Points& q = body.points;
-            const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
-            const NodalVelocity<S> v(lattice_, bin, nodes_.vx, nodes_.vy);
-            for_each_pack(bin.begin, bin.end, [&](std::size_t p, const auto& lanes) {
-                const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                law.update(q, p, lanes, v.template gradient<Strain>(at, strain, dt));
+        for_each_bin(
+            [&](Body& body, const auto& law, const Bin& bin, const BinFrame& frame)
+            {
+                Points& q = body.points;
+                const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
+                const NodalVelocity<S> v(lattice_, bin, nodes_.vx, nodes_.vy);
+                for_each_pack(bin.begin, bin.end,
+                              [&](std::size_t p, const auto& lanes)
+                              {
+                                  const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
+                                  law.update(q, p, lanes, v.template gradient<Strain>(at, strain, dt));
+                              });
             });
-        });
     }
 
     /// Position with the carrier velocity; volume or box, and stress if it is not updated first, with the nodal velocity.
@@ -207,26 +233,30 @@ private:
     void move_points(const std::vector<double>& carrier_x, const std::vector<double>& carrier_y, double dt)
     {
         std::atomic<bool> moved{false};
-        for_each_bin([&](Body& body, const auto& law, const Bin& bin, const BinFrame& frame) {
-            Points& q = body.points;
-            const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
-            const NodalVelocity<S> carrier(lattice_, bin, carrier_x, carrier_y), v(lattice_, bin, nodes_.vx, nodes_.vy);
-            bool left = false;
-            for_each_pack(bin.begin, bin.end, [&](std::size_t p, const auto& lanes) {
-                const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                const Gradient<Pack> d = v.template gradient<Strain>(at, strain, dt);
-                if constexpr (with_stress)
-                    law.update(q, p, lanes, d);
-                stretch<Shape>(q, p, lanes, d);
-                const auto step = carrier.at(at);
-                const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
-                lanes.store(&q.x[p], x);
-                lanes.store(&q.y[p], y);
-                left |= frame.left<Shape>(q, p, lanes, x, y);
+        for_each_bin(
+            [&](Body& body, const auto& law, const Bin& bin, const BinFrame& frame)
+            {
+                Points& q = body.points;
+                const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
+                const NodalVelocity<S> carrier(lattice_, bin, carrier_x, carrier_y), v(lattice_, bin, nodes_.vx, nodes_.vy);
+                bool left = false;
+                for_each_pack(bin.begin, bin.end,
+                              [&](std::size_t p, const auto& lanes)
+                              {
+                                  const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
+                                  const Gradient<Pack> d = v.template gradient<Strain>(at, strain, dt);
+                                  if constexpr (with_stress)
+                                      law.update(q, p, lanes, d);
+                                  stretch<Shape>(q, p, lanes, d);
+                                  const auto step = carrier.at(at);
+                                  const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
+                                  lanes.store(&q.x[p], x);
+                                  lanes.store(&q.y[p], y);
+                                  left |= frame.left<Shape>(q, p, lanes, x, y);
+                              });
+                if (left)
+                    moved.store(true, std::memory_order_relaxed);
             });
-            if (left)
-                moved.store(true, std::memory_order_relaxed);
-        });
         moved_ = moved;
     }
 

@@ -17,7 +17,10 @@ struct ShapeAt
     std::array<Pack, S> wx, wy, gx, gy;
 
     ShapeAt(const Corner& c, double scale)
-        : wx(Shape::weights(c.ax, c.wx)), wy(Shape::weights(c.ay, c.wy)), gx(Shape::slopes(c.ax, c.wx)), gy(Shape::slopes(c.ay, c.wy))
+        : wx(Shape::weights(c.ax, c.wx)),
+          wy(Shape::weights(c.ay, c.wy)),
+          gx(Shape::slopes(c.ax, c.wx)),
+          gy(Shape::slopes(c.ay, c.wy))
     {
         for (int k = 0; k < S; ++k)
         {
@@ -56,13 +59,15 @@ struct BBarStrain
             static_assert(std::is_same_v<Shape, LinearShape>);
             const BinFrame frame(lattice, bin);
             Pack total(0.0), ax(0.0), ay(0.0);
-            for_each_pack(bin.begin, bin.end, [&](std::size_t p, const auto& lanes) {
-                const Corner c = frame.corner<Shape>(q, p, lanes);
-                const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
-                total += v;
-                ax += v * lanes.keep(c.ax);
-                ay += v * lanes.keep(c.ay);
-            });
+            for_each_pack(bin.begin, bin.end,
+                          [&](std::size_t p, const auto& lanes)
+                          {
+                              const Corner c = frame.corner<Shape>(q, p, lanes);
+                              const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
+                              total += v;
+                              ax += v * lanes.keep(c.ax);
+                              ay += v * lanes.keep(c.ay);
+                          });
             const double all = sum(total);
             const ShapeAt<Shape> at({Pack(sum(ax) / all), Pack(sum(ay) / all), Pack(0.0), Pack(0.0)}, frame.scale);
             for (int k = 0; k < 4; ++k)
@@ -82,7 +87,9 @@ enum class Scatter
     momentum_and_force  ///< both
 };
 template <Scatter what>
-inline constexpr std::size_t sums_of = what == Scatter::momentum_and_force ? 5 : what == Scatter::momentum ? 3 : 2;
+inline constexpr std::size_t sums_of = what == Scatter::momentum_and_force ? 5
+                                       : what == Scatter::momentum         ? 3
+                                                                           : 2;
 
 /// m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V sigma . grad N_i, to the blocks of each bin.
 /// With B-bar the mean in-plane stress works on the cell's dilatation: dual to the strain of gather_strain().
@@ -93,62 +100,66 @@ void scatter(const Lattice& lattice, const Body& body, std::size_t first_bin, st
     constexpr std::size_t Q = sums_of<what>;
     const auto& bins = body.bins.list();
     const Points& q = body.points;
-    parallel_for(bins.size(), [&](std::size_t b) {
-        const BinFrame frame(lattice, bins[b]);
-        const typename Strain::template InBin<Shape> strain(lattice, q, bins[b]);
-        std::array<Pack, S * S * Q> total{};
-        for_each_pack(bins[b].begin, bins[b].end, [&](std::size_t p, const auto& lanes) {
-            const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-            [[maybe_unused]] Pack m, px, py, txx, tyy, txy, mean;
-            if constexpr (what != Scatter::force)
-            {
-                m = lanes.keep(Pack(q.mass));
-                px = m * lanes.load(&q.vx[p]);
-                py = m * lanes.load(&q.vy[p]);
-            }
-            if constexpr (what != Scatter::momentum)
-            {
-                const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
-                txx = v * lanes.load(&q.sxx[p]);
-                tyy = v * lanes.load(&q.syy[p]);
-                txy = v * lanes.load(&q.sxy[p]);
-                mean = Pack(0.5) * (txx + tyy);
-            }
-            for (int j = 0; j < S; ++j)
-                for (int i = 0; i < S; ++i)
-                {
-                    Pack* to = &total[static_cast<std::size_t>(j * S + i) * Q];
-                    if constexpr (what != Scatter::force)
-                    {
-                        const Pack N = at.value(i, j);
-                        to[0] += m * N;
-                        to[1] += px * N;
-                        to[2] += py * N;
-                    }
-                    if constexpr (what != Scatter::momentum)
-                    {
-                        const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
-                        to[Q - 2] -= txx * nx + txy * ny;
-                        to[Q - 1] -= txy * nx + tyy * ny;
-                        if constexpr (Strain::averaged)
-                        {
-                            to[Q - 2] -= mean * (strain.mean_x[j * S + i] - nx);
-                            to[Q - 1] -= mean * (strain.mean_y[j * S + i] - ny);
-                        }
-                    }
-                }
-        });
-        double* to = &partial[(first_bin + b) * S * S * Q];
-        for (std::size_t k = 0; k < total.size(); ++k)
-            to[k] = sum(total[k]);
-    });
+    parallel_for(bins.size(),
+                 [&](std::size_t b)
+                 {
+                     const BinFrame frame(lattice, bins[b]);
+                     const typename Strain::template InBin<Shape> strain(lattice, q, bins[b]);
+                     std::array<Pack, S * S * Q> total{};
+                     for_each_pack(bins[b].begin, bins[b].end,
+                                   [&](std::size_t p, const auto& lanes)
+                                   {
+                                       const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
+                                       [[maybe_unused]] Pack m, px, py, txx, tyy, txy, mean;
+                                       if constexpr (what != Scatter::force)
+                                       {
+                                           m = lanes.keep(Pack(q.mass));
+                                           px = m * lanes.load(&q.vx[p]);
+                                           py = m * lanes.load(&q.vy[p]);
+                                       }
+                                       if constexpr (what != Scatter::momentum)
+                                       {
+                                           const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
+                                           txx = v * lanes.load(&q.sxx[p]);
+                                           tyy = v * lanes.load(&q.syy[p]);
+                                           txy = v * lanes.load(&q.sxy[p]);
+                                           mean = Pack(0.5) * (txx + tyy);
+                                       }
+                                       for (int j = 0; j < S; ++j)
+                                           for (int i = 0; i < S; ++i)
+                                           {
+                                               Pack* to = &total[static_cast<std::size_t>(j * S + i) * Q];
+                                               if constexpr (what != Scatter::force)
+                                               {
+                                                   const Pack N = at.value(i, j);
+                                                   to[0] += m * N;
+                                                   to[1] += px * N;
+                                                   to[2] += py * N;
+                                               }
+                                               if constexpr (what != Scatter::momentum)
+                                               {
+                                                   const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
+                                                   to[Q - 2] -= txx * nx + txy * ny;
+                                                   to[Q - 1] -= txy * nx + tyy * ny;
+                                                   if constexpr (Strain::averaged)
+                                                   {
+                                                       to[Q - 2] -= mean * (strain.mean_x[j * S + i] - nx);
+                                                       to[Q - 1] -= mean * (strain.mean_y[j * S + i] - ny);
+                                                   }
+                                               }
+                                           }
+                                   });
+                     double* to = &partial[(first_bin + b) * S * S * Q];
+                     for (std::size_t k = 0; k < total.size(); ++k)
+                         to[k] = sum(total[k]);
+                 });
 }
 
 /// Nodal values of one bin.
 template <int S>
 struct NodalVelocity
 {
-    std::array<double, static_cast<std::size_t>(S* S)> x, y;
+    std::array<double, static_cast<std::size_t>(S*S)> x, y;
 
     NodalVelocity(const Lattice& lattice, const Bin& bin, const std::vector<double>& vx, const std::vector<double>& vy)
     {

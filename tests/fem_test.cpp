@@ -144,7 +144,8 @@ TEST(FemStatic, Q2HoldsTheColumnExactlyAtAnyCellSize)
 
 TEST(FemStatic, Q1ConvergesWithOrderTwoInDisplacementAndOneInStress)
 {
-    const auto at = [](const char* setting) {
+    const auto at = [](const char* setting)
+    {
         const Scene scene = column({setting, "fem.analysis=static"}, "fem-q1");
         return errors(*solved(scene), exact_column);
     };
@@ -174,14 +175,17 @@ TEST(FemStatic, TwoBodiesInSeriesShareTheirStress)
                                  {"fem.analysis=static"});
     const auto solver = solved(scene);
     const double weight = 2500 * g * 2;  // of the upper body, on the interface
-    const Vec2 e = errors(*solver, [&](double, double Y) {
-        const bool lower = Y < 2;
-        const double syy = lower ? -weight - rho * g * (2 - Y) : -2500 * g * (4 - Y);
-        const double interface = -(2 * weight + rho * g * 2) / M;
-        const double h = Y - 2;
-        const double uy = lower ? -(weight * Y + rho * g * (2 * Y - Y * Y / 2)) / M : interface - 2500 * g * (2 * h - h * h / 2) / M2;
-        return Exact{{0, uy}, {nu / (1 - nu) * syy, syy, 0}};
-    });
+    const Vec2 e = errors(*solver,
+                          [&](double, double Y)
+                          {
+                              const bool lower = Y < 2;
+                              const double syy = lower ? -weight - rho * g * (2 - Y) : -2500 * g * (4 - Y);
+                              const double interface = -(2 * weight + rho * g * 2) / M;
+                              const double h = Y - 2;
+                              const double uy = lower ? -(weight * Y + rho * g * (2 * Y - Y * Y / 2)) / M
+                                                      : interface - 2500 * g * (2 * h - h * h / 2) / M2;
+                              return Exact{{0, uy}, {nu / (1 - nu) * syy, syy, 0}};
+                          });
     EXPECT_LT(e[0], 1e-11);
     EXPECT_LT(e[1], 1e-11);
 }
@@ -190,14 +194,14 @@ TEST(FemStatic, ModulusOfPositionAndBodyForceHoldAManufacturedSolution)
 {
     // nu = 0, E = E0 (1 + Y / H), u = a (Y^2 / 2 - H Y): the body force that balances it is -2 E0 a Y / (H rho)
     const double a = 1e-3;
-    const std::string material =
-        "[[material]]\nname = \"soil\"\nlaw = \"linear_elastic\"\ndensity = 1700.0\n"
-        "youngs_modulus = \"5e7*(1+Y/4)\"\npoissons_ratio = 0.0\n";
+    const std::string material = "[[material]]\nname = \"soil\"\nlaw = \"linear_elastic\"\ndensity = 1700.0\n"
+                                 "youngs_modulus = \"5e7*(1+Y/4)\"\npoissons_ratio = 0.0\n";
     const std::string force = "[body_force]\nacceleration = [\"0\", \"-2*5e7*1e-3*Y/(4*1700)\"]\n";
     const Scene scene = scene_of(material + box("column", 0, 0, 2, H) + force + supports, {"fem.analysis=static"});
-    const Vec2 e = errors(*solved(scene), [&](double, double Y) {
-        return Exact{{0, a * (Y * Y / 2 - H * Y)}, {0, E * (1 + Y / H) * a * (Y - H), 0}};
-    });
+    const Vec2 e = errors(*solved(scene),
+                          [&](double, double Y) {
+                              return Exact{{0, a * (Y * Y / 2 - H * Y)}, {0, E * (1 + Y / H) * a * (Y - H), 0}};
+                          });
     EXPECT_LT(e[0], 1e-11);
     EXPECT_LT(e[1], 1e-11);
 }
@@ -308,8 +312,8 @@ TEST(FemDynamic, FreeFlightKeepsMomentumAndStaysFreeOfStress)
 {
     for (const char* integrator : {"newmark", "central_difference"})
     {
-        const Scene scene = scene_of(soil + box("block", 0.3, 0.2, 3.3, 2.2, "velocity = [\"2\", \"1\"]"),
-                                     {fmt::format("fem.integrator={}", integrator)});
+        const Scene scene =
+            scene_of(soil + box("block", 0.3, 0.2, 3.3, 2.2, "velocity = [\"2\", \"1\"]"), {fmt::format("fem.integrator={}", integrator)});
         const auto solver = solver_of(scene);
         EXPECT_FALSE(solver->is_static());
         const double dt = 0.5 * solver->critical_time_step(scene);
@@ -455,7 +459,8 @@ TEST(FemScene, RefusesBoxesThatDoNotShareLatticeLines)
 
 TEST(FemScene, RefusesAStaticAnalysisOfWhatCanMove)
 {
-    const auto refusal = [](const std::string& boundaries, const std::string& more_bodies = "") {
+    const auto refusal = [](const std::string& boundaries, const std::string& more_bodies = "")
+    {
         const Scene scene = scene_of(soil + box("block", 0, 0, 2, 2) + more_bodies + gravity + boundaries, {"fem.analysis=static"});
         return message_of([&] { solved(scene); });
     };
@@ -472,9 +477,9 @@ TEST(FemScene, RefusesAStaticAnalysisOfWhatCanMove)
 
 TEST(FemScene, WarnsOfASteppedDisk)
 {
-    const Scene scene = scene_of(std::string(soil) +
-                                 "[[body]]\nname = \"disk\"\nmaterial = \"soil\"\nshape = \"disk\"\ncenter = [3.0, 3.0]\nradius = 2.0\n"
-                                 "velocity = [\"3-Y\", \"X-3\"]\n");
+    const Scene scene =
+        scene_of(std::string(soil) + "[[body]]\nname = \"disk\"\nmaterial = \"soil\"\nshape = \"disk\"\ncenter = [3.0, 3.0]\nradius = 2.0\n"
+                                     "velocity = [\"3-Y\", \"X-3\"]\n");
     std::string warning;
     const auto solver = make_fem(scene, [&](const std::string& message) { warning = message; });
     EXPECT_NE(warning.find("stepped"), std::string::npos) << warning;

@@ -1,6 +1,6 @@
-#include "lpfdm/lpfdm.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
+#include "lpfdm/lpfdm.hpp"
 #include "tests/oracle.hpp"
 #include "tests/random.hpp"
 
@@ -115,7 +115,8 @@ TEST(Forces, VirtualWorkDomainSupport)
 /// fill the cells evenly.
 TEST(Forces, PatchOfShiftedPoints)
 {
-    const auto inner_force = [](const std::string& method, double shift) {
+    const auto inner_force = [](const std::string& method, double shift)
+    {
         Scene scene = test::load(R"toml(
 [grid]
 size = [8.0, 8.0]
@@ -132,11 +133,15 @@ poissons_ratio = 0.0
 name = "b"
 material = "m"
 shape = "box"
-min = [)toml" + std::to_string(1 + shift) + "," + std::to_string(1 + 0.7 * shift) + R"toml(]
-max = [)toml" + std::to_string(6 + shift) + "," + std::to_string(6 + 0.7 * shift) + R"toml(]
+min = [)toml" + std::to_string(1 + shift) +
+                                     "," + std::to_string(1 + 0.7 * shift) + R"toml(]
+max = [)toml" + std::to_string(6 + shift) +
+                                     "," + std::to_string(6 + 0.7 * shift) + R"toml(]
 points_per_cell = 3
-)toml", method);
-        const auto measure = [&]<class Support>(Support) {
+)toml",
+                                 method);
+        const auto measure = [&]<class Support>(Support)
+        {
             LpfdmGrid grid(make_lattice(scene.grid));
             auto bodies = make_bodies(scene, grid.lattice, {.box = Support::has_box});
             std::vector<double> workspace;
@@ -152,7 +157,8 @@ points_per_cell = 3
             double largest = 0;
             for (int j = 3; j <= 5; ++j)
                 for (int i = 3; i <= 5; ++i)
-                    largest = std::max({largest, std::abs(grid.nodes.fx[grid.lattice.node(i, j)]), std::abs(grid.nodes.fy[grid.lattice.node(i, j)])});
+                    largest = std::max(
+                        {largest, std::abs(grid.nodes.fx[grid.lattice.node(i, j)]), std::abs(grid.nodes.fy[grid.lattice.node(i, j)])});
             return largest;
         };
         return scene.lpfdm.support == "point" ? measure(PointSupport{}) : measure(DomainSupport{});
@@ -185,7 +191,8 @@ TEST_P(LpfdmOracle, SameTrajectories)
         wave_speed = std::max(wave_speed, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
     reference.hourglass_rate = scene.lpfdm.hourglass * wave_speed / 0.5;
     const std::size_t first_body = solver->bodies()[0].points.count;
-    const auto velocity = [&](std::size_t p, Vec2 x) {
+    const auto velocity = [&](std::size_t p, Vec2 x)
+    {
         const VectorExpression v(*scene.bodies[p < first_body ? 0 : 1].velocity, {});
         return v({x[0], x[1], x[0], x[1], 0});
     };
@@ -199,8 +206,10 @@ TEST_P(LpfdmOracle, SameTrajectories)
 }
 
 INSTANTIATE_TEST_SUITE_P(Variants, LpfdmOracle,
-                         testing::Values(LpfdmCase{"published", "lpfdm-2000", {}, false, false}, LpfdmCase{"point_central", "lpfdm-2000", {"lpfdm.convection=central"}, false, true},
-                                         LpfdmCase{"domain_central", "lpfdm", {}, true, true}, LpfdmCase{"domain_upwind", "lpfdm", {"lpfdm.convection=upwind"}, true, false},
+                         testing::Values(LpfdmCase{"published", "lpfdm-2000", {}, false, false},
+                                         LpfdmCase{"point_central", "lpfdm-2000", {"lpfdm.convection=central"}, false, true},
+                                         LpfdmCase{"domain_central", "lpfdm", {}, true, true},
+                                         LpfdmCase{"domain_upwind", "lpfdm", {"lpfdm.convection=upwind"}, true, false},
                                          LpfdmCase{"strong_hourglass", "lpfdm", {"lpfdm.hourglass=0.3"}, true, true}),
                          [](const auto& info) { return std::string(info.param.name); });
 
@@ -231,7 +240,8 @@ max = [7.0, 7.0]
 points_per_cell = 2
 velocity = ["1e-4*c*cos(pi*X)*cos(pi*Y)", 0]
 )toml";
-    const auto kept = [&](const std::string& method) {
+    const auto kept = [&](const std::string& method)
+    {
         const auto solver = make_lpfdm(test::load(patch, method));
         solver->prepare(0, 1e-3);
         const double start = solver->sums().kinetic_energy;
@@ -254,7 +264,8 @@ TEST(Convection, LinearField)
     const Gradient<> g{0.3, -0.2, 0.7, 0.4};
     const double dt = 0.02;
     const auto field = [&](const Vec2& x) { return Vec2{1 + g.xx * x[0] + g.xy * x[1], -1 + g.yx * x[0] + g.yy * x[1]}; };
-    const auto check = [&](auto scheme) {
+    const auto check = [&](auto scheme)
+    {
         for (const auto n : grid.nodes.active)
         {
             const Vec2 v = field(grid.lattice.node_position(n));
@@ -264,15 +275,17 @@ TEST(Convection, LinearField)
         cell_gradients(grid, dt);
         convect<decltype(scheme)>(grid, dt);
         int inside = 0;
-        grid.for_each_node([&](std::size_t n, std::size_t first_cell) {
-            for (int k = 0; k < 4; ++k)
-                if (grid.cells.mass[grid.around(first_cell, k)] == 0)
-                    return;
-            const Vec2 v = field(grid.lattice.node_position(n));
-            EXPECT_NEAR(grid.nodes.vx[n], v[0] - dt * (v[0] * g.xx + v[1] * g.xy), 1e-13);
-            EXPECT_NEAR(grid.nodes.vy[n], v[1] - dt * (v[0] * g.yx + v[1] * g.yy), 1e-13);
-            ++inside;
-        });
+        grid.for_each_node(
+            [&](std::size_t n, std::size_t first_cell)
+            {
+                for (int k = 0; k < 4; ++k)
+                    if (grid.cells.mass[grid.around(first_cell, k)] == 0)
+                        return;
+                const Vec2 v = field(grid.lattice.node_position(n));
+                EXPECT_NEAR(grid.nodes.vx[n], v[0] - dt * (v[0] * g.xx + v[1] * g.xy), 1e-13);
+                EXPECT_NEAR(grid.nodes.vy[n], v[1] - dt * (v[0] * g.yx + v[1] * g.yy), 1e-13);
+                ++inside;
+            });
         EXPECT_GT(inside, 1);
     };
     check(UpwindConvection{});
@@ -281,7 +294,8 @@ TEST(Convection, LinearField)
 
 TEST(Lpfdm, SameBitsForAnyThreads)
 {
-    const auto run = [](const std::string& method, int threads) {
+    const auto run = [](const std::string& method, int threads)
+    {
         set_threads(threads);
         const auto solver = make_lpfdm(test::load(test::two_bodies(0.1, 4), method));
         for (int n = 0; n < 100; ++n)

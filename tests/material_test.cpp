@@ -87,7 +87,8 @@ TEST(Rotation, RigidTurn)
     const SymTensor<> start{3, -1, 0.5};
     const double angle = 2 * std::numbers::pi / 3, step = angle / 100;
     const double c = std::cos(angle), s = std::sin(angle);
-    const SymTensor<> turned{c * c * start.xx + s * s * start.yy - 2 * c * s * start.xy, s * s * start.xx + c * c * start.yy + 2 * c * s * start.xy,
+    const SymTensor<> turned{c * c * start.xx + s * s * start.yy - 2 * c * s * start.xy,
+                             s * s * start.xx + c * c * start.yy + 2 * c * s * start.xy,
                              c * s * (start.xx - start.yy) + (c * c - s * s) * start.xy};
     HypoelasticExactRotation::State<double> exact{start};
     HypoelasticJaumann::State<double> first{start};
@@ -109,7 +110,8 @@ TEST(Rotation, RigidTurn)
 TEST(Batch, EqualsPointFunction)
 {
     test::Random random(5);
-    const auto check = [&](auto law, bool varies) {
+    const auto check = [&](auto law, bool varies)
+    {
         Points q;
         const std::size_t n = pack_size + 3;
         q.count = n;
@@ -125,9 +127,10 @@ TEST(Batch, EqualsPointFunction)
             q.stiffness[p] = random(0.1, 1);
         }
         const Gradient<> d{1e-3, -2e-3, 3e-3, -4e-3};
-        for_each_pack(0, n, [&](std::size_t p, const auto& lanes) {
-            law.update(q, p, lanes, Gradient<Pack>{Pack(d.xx), Pack(d.yy), Pack(d.xy), Pack(d.yx)});
-        });
+        for_each_pack(0, n,
+                      [&](std::size_t p, const auto& lanes) {
+                          law.update(q, p, lanes, Gradient<Pack>{Pack(d.xx), Pack(d.yy), Pack(d.xy), Pack(d.yx)});
+                      });
         for (std::size_t p = 0; p < n; ++p)
         {
             typename decltype(law)::template State<double> state{start[p]};

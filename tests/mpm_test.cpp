@@ -96,10 +96,12 @@ TEST_P(MpmOracle, SameTrajectories)
 {
     const MpmCase& c = GetParam();
     // one modulus per body: the oracle of B-bar tells bodies apart by it
-    const Scene scene = test::load(test::two_bodies() + "[gravity]\nacceleration = [0.4, -1.3]\n", c.method,
-                                   {std::string("mpm.scheme=") + c.scheme, "mpm.flip=" + std::to_string(c.flip), "material.stiff.youngs_modulus=3e4"});
+    const Scene scene =
+        test::load(test::two_bodies() + "[gravity]\nacceleration = [0.4, -1.3]\n", c.method,
+                   {std::string("mpm.scheme=") + c.scheme, "mpm.flip=" + std::to_string(c.flip), "material.stiff.youngs_modulus=3e4"});
     const auto solver = make_mpm(scene);
-    test::RefMpm reference{{0.5, -1, -1}, test::reference_points(scene), scene.mpm.shape == "cpgimp", c.scheme, c.flip, scene.mpm.strain == "b_bar"};
+    test::RefMpm reference{{0.5, -1, -1}, test::reference_points(scene), scene.mpm.shape == "cpgimp", c.scheme,
+                           c.flip,        scene.mpm.strain == "b_bar"};
     for (int n = 0; n < 40; ++n)
     {
         solver->prepare(n * 0.01, 0.01);
@@ -112,17 +114,20 @@ TEST_P(MpmOracle, SameTrajectories)
 INSTANTIATE_TEST_SUITE_P(Variants, MpmOracle,
                          testing::Values(MpmCase{"mpm-linear", "usl", 1}, MpmCase{"mpm-linear", "musl", 1}, MpmCase{"mpm-linear", "usf", 1},
                                          MpmCase{"mpm-linear", "musl", 0.9}, MpmCase{"mpm-linear-bbar", "musl", 1},
-                                         MpmCase{"mpm-linear-bbar", "usl", 1}, MpmCase{"mpm-cpgimp", "musl", 1}, MpmCase{"mpm-cpgimp", "usl", 0.95},
-                                         MpmCase{"mpm-cpgimp", "usf", 1}),
-                         [](const auto& info) {
-                             std::string name = std::string(info.param.method) + "_" + info.param.scheme + (info.param.flip < 1 ? "_blend" : "");
+                                         MpmCase{"mpm-linear-bbar", "usl", 1}, MpmCase{"mpm-cpgimp", "musl", 1},
+                                         MpmCase{"mpm-cpgimp", "usl", 0.95}, MpmCase{"mpm-cpgimp", "usf", 1}),
+                         [](const auto& info)
+                         {
+                             std::string name =
+                                 std::string(info.param.method) + "_" + info.param.scheme + (info.param.flip < 1 ? "_blend" : "");
                              std::replace(name.begin(), name.end(), '-', '_');
                              return name;
                          });
 
 TEST(Mpm, SameBitsForAnyThreads)
 {
-    const auto run = [](const std::string& method, int threads) {
+    const auto run = [](const std::string& method, int threads)
+    {
         set_threads(threads);
         const auto solver = make_mpm(test::load(test::two_bodies(0.1, 4), method));
         for (int n = 0; n < 100; ++n)
@@ -143,7 +148,8 @@ TEST(Mpm, SameBitsForAnyThreads)
 /// PIC dissipates, FLIP does not: the energy of a free body after many steps.
 TEST(Mpm, PicDissipates)
 {
-    const auto energy = [](double flip) {
+    const auto energy = [](double flip)
+    {
         const auto solver = make_mpm(test::load(test::two_bodies(), "mpm-cpgimp", {"mpm.flip=" + std::to_string(flip)}));
         solver->prepare(0, 0.005);
         const double start = solver->sums().kinetic_energy;

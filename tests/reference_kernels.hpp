@@ -266,7 +266,8 @@ struct RefMpm
         std::vector<Shape> out;
         const double L = grid.L, cx = (p.x - grid.ox) / L, cy = (p.y - grid.oy) / L;
         const int i0 = static_cast<int>(std::floor(cx)), j0 = static_cast<int>(std::floor(cy));
-        const auto one = [&](double c, int i, double h, double& N, double& g) {
+        const auto one = [&](double c, int i, double h, double& N, double& g)
+        {
             if (gimp)
             {
                 h = std::min(h / L, 0.5);

@@ -75,8 +75,8 @@ TEST(Scene, ConstantsInAnyOrderAndTheCellSize)
 TEST(Scene, OverridesReplaceAnyKey)
 {
     const Scene scene = test::load(minimal, "mpm-cpgimp",
-                                   {"grid.cell_size=0.25", "body.block.points_per_cell=2", "material.0.density=5", "gravity.acceleration=[0, -1]",
-                                    "constants.H=6", "lpfdm.support=point"});
+                                   {"grid.cell_size=0.25", "body.block.points_per_cell=2", "material.0.density=5",
+                                    "gravity.acceleration=[0, -1]", "constants.H=6", "lpfdm.support=point"});
     EXPECT_DOUBLE_EQ(scene.grid.cell_size, 0.25);
     EXPECT_EQ(scene.bodies[0].points_per_cell, 2);
     EXPECT_DOUBLE_EQ(scene.materials[0].density, 5);
@@ -91,9 +91,10 @@ TEST(Scene, ResolvedSceneReadsBack)
 {
     for (const Variant& v : variants())
     {
-        const std::string text = resolved_toml(test::load(test::two_bodies() + "[gravity]\nacceleration = [0, -9.81]\nramp = 0.1\n"
+        const std::string text =
+            resolved_toml(test::load(test::two_bodies() + "[gravity]\nacceleration = [0, -9.81]\nramp = 0.1\n"
                                                           "[exact.hypoelastic]\ndisplacement = [\"X\", 0]\n[report.reference]\na = 2\n",
-                                                          v.name));
+                                     v.name));
         EXPECT_EQ(resolved_toml(test::load(text)), text) << v.name;
     }
 }
@@ -158,7 +159,8 @@ TEST(Scene, MissingBodyOrTable)
 
 TEST(Scene, WarnsOfALargeTimeStepAndOfLocking)
 {
-    const auto warnings = [](const std::string& method, const std::vector<std::string>& overrides) {
+    const auto warnings = [](const std::string& method, const std::vector<std::string>& overrides)
+    {
         const test::SceneFile file(minimal);
         return load_scene(file.path(), method, overrides).warnings;
     };
@@ -174,7 +176,8 @@ TEST(Scene, WarnsOfALargeTimeStepAndOfLocking)
 TEST(Documentation, NamesEveryTable)
 {
     const std::string all = scene_documentation();
-    for (const char* name : {"[grid]", "[time]", "[[body]]", "[[boundary]]", "[exact.<small_strain|hypoelastic>]", "[report.reference]", "cell_size"})
+    for (const char* name :
+         {"[grid]", "[time]", "[[body]]", "[[boundary]]", "[exact.<small_strain|hypoelastic>]", "[report.reference]", "cell_size"})
         EXPECT_NE(all.find(name), std::string::npos) << name;
     EXPECT_NE(scene_documentation("lpfdm").find("hourglass"), std::string::npos);
     EXPECT_EQ(scene_documentation("lpfdm").find("flip"), std::string::npos);

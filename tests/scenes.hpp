@@ -40,7 +40,8 @@ inline std::string two_bodies(double cell_size = 0.5, int points_per_cell = 3)
 [grid]
 origin = [-1.0, -1.0]
 size = [4.0, 4.0]
-cell_size = )toml" + std::to_string(cell_size) + R"toml(
+cell_size = )toml" +
+           std::to_string(cell_size) + R"toml(
 [time]
 end = 1.0
 [[material]]
@@ -61,7 +62,8 @@ material = "soft"
 shape = "box"
 min = [-0.37, -0.21]
 max = [0.63, 0.79]
-points_per_cell = )toml" + std::to_string(points_per_cell) + R"toml(
+points_per_cell = )toml" +
+           std::to_string(points_per_cell) + R"toml(
 velocity = ["0.6*sin(5*X+Y)", "0.5*cos(7*Y-3*X)"]
 [[body]]
 name = "two"
@@ -69,7 +71,8 @@ material = "stiff"
 shape = "disk"
 center = [1.2, 0.3]
 radius = 0.6
-points_per_cell = )toml" + std::to_string(points_per_cell) + R"toml(
+points_per_cell = )toml" +
+           std::to_string(points_per_cell) + R"toml(
 velocity = ["-0.3*Y", "0.4*X"]
 )toml";
 }

@@ -87,13 +87,15 @@ TEST(Lanes, MaskWhatLiesBehindTheEnd)
     std::vector<double> data(3 * pack_size, 1.0);
     double total = 0;
     std::size_t calls = 0;
-    for_each_pack(2, 2 + pack_size + 3, [&](std::size_t p, const auto& lanes) {
-        const Pack v = lanes.load(&data[p]);
-        total += sum(lanes.keep(v));
-        lanes.store(&data[p], v + Pack(1.0));
-        EXPECT_FALSE(lanes.any(v > Pack(1.5)));
-        ++calls;
-    });
+    for_each_pack(2, 2 + pack_size + 3,
+                  [&](std::size_t p, const auto& lanes)
+                  {
+                      const Pack v = lanes.load(&data[p]);
+                      total += sum(lanes.keep(v));
+                      lanes.store(&data[p], v + Pack(1.0));
+                      EXPECT_FALSE(lanes.any(v > Pack(1.5)));
+                      ++calls;
+                  });
     EXPECT_EQ(calls, 2u);
     EXPECT_DOUBLE_EQ(total, static_cast<double>(pack_size) + 3);
     for (std::size_t k = 0; k < data.size(); ++k)

@@ -24,9 +24,9 @@ public:
     }
     double youngs_modulus() const { return youngs_modulus_; }
     double poissons_ratio() const { return poissons_ratio_; }
-    double shear() const { return shear_; }                      ///< G, mu
-    double lame() const { return lame_; }                        ///< lambda
-    double constrained() const { return lame_ + 2 * shear_; }    ///< M
+    double shear() const { return shear_; }                    ///< G, mu
+    double lame() const { return lame_; }                      ///< lambda
+    double constrained() const { return lame_ + 2 * shear_; }  ///< M
 
 private:
     double youngs_modulus_ = 0, poissons_ratio_ = 0, shear_ = 0, lame_ = 0;

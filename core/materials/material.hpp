@@ -17,9 +17,12 @@ using Material = std::variant<LinearElastic, HypoelasticJaumann, HypoelasticExac
 
 /// What a law must offer: a pure point function (FEM quadrature calls it, too) and its batch form.
 template <class Law>
-concept MaterialLaw = requires(const Law law, typename Law::template State<double> state, Points points,
-                               Gradient<double> d, Gradient<Pack> packs) {
-    { law.moduli } -> std::convertible_to<ElasticModuli>;
+concept MaterialLaw = requires(const Law law, typename Law::template State<double> state, Points points, Gradient<double> d,
+                               Gradient<Pack> packs)
+{
+    {
+        law.moduli
+        } -> std::convertible_to<ElasticModuli>;
     law.update(state, d);
     law.update(points, std::size_t{}, AllLanes{}, packs);
 };

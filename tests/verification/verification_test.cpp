@@ -1,8 +1,8 @@
 /// Verification cases at coarse levels: purpose, source and expected value stand with each. The same scenes at all levels are the
 /// studies in benchmarks/studies.
 
-#include "core/observer.hpp"
 #include "core/method_limits.hpp"
+#include "core/observer.hpp"
 #include "core/run.hpp"
 #include "lpfdm/lpfdm.hpp"
 #include "mpm/mpm.hpp"
@@ -36,7 +36,8 @@ State run(const std::string& name, const std::string& method, const std::vector<
         if (n == steps)
             break;
         if (s.scene.time.stop_unbalanced && n % 50 == 0 && n > 0 && s.t > s.scene.gravity->ramp &&
-            s.solver->sums().unbalanced < *s.scene.time.stop_unbalanced && Observer::kinetic_ratio(*s.solver) < *s.scene.time.stop_unbalanced)
+            s.solver->sums().unbalanced < *s.scene.time.stop_unbalanced &&
+            Observer::kinetic_ratio(*s.solver) < *s.scene.time.stop_unbalanced)
             break;
         s.solver->advance(dt);
     }
@@ -138,21 +139,23 @@ TEST(SuddenColumn, FirstPeak)
     for (const auto& method : particle_methods)
     {
         double peak = 0, time = 0, static_tip = 0;
-        run("elastic_column_sudden", method, {"time.end=H*3/c"}, [&](const State& s) {
-            const Points& q = s.solver->bodies()[0].points;
-            double lowest = 0, top = 0;
-            for (std::size_t p = 0; p < q.count; ++p)
-                top = std::max(top, q.y[p]);
-            lowest = 9.875 - top;  // L = 1, four points per cell
-            if (lowest > peak)
+        run("elastic_column_sudden", method, {"time.end=H*3/c"},
+            [&](const State& s)
             {
-                peak = lowest;
-                time = s.t;
-            }
-            for (const auto& [name, value] : s.scene.report.reference)
-                if (name == "static_displacement")
-                    static_tip = value;
-        });
+                const Points& q = s.solver->bodies()[0].points;
+                double lowest = 0, top = 0;
+                for (std::size_t p = 0; p < q.count; ++p)
+                    top = std::max(top, q.y[p]);
+                lowest = 9.875 - top;  // L = 1, four points per cell
+                if (lowest > peak)
+                {
+                    peak = lowest;
+                    time = s.t;
+                }
+                for (const auto& [name, value] : s.scene.report.reference)
+                    if (name == "static_displacement")
+                        static_tip = value;
+            });
         EXPECT_NEAR(peak / static_tip, 2.0, 0.02) << method;
         EXPECT_NEAR(time / (20 / 420.4), 1.0, 0.02) << method;
     }
@@ -164,10 +167,12 @@ TEST(FreeFlight, MomentumAndNoStress)
     for (const auto& method : particle_methods)
     {
         Vec2 start{0, 0};
-        const State s = run("free_flight", method, {"constants.ppc=2"}, [&](const State& now) {
-            if (now.t == 0)
-                start = now.solver->sums().momentum;
-        });
+        const State s = run("free_flight", method, {"constants.ppc=2"},
+                            [&](const State& now)
+                            {
+                                if (now.t == 0)
+                                    start = now.solver->sums().momentum;
+                            });
         const Vec2 end = s.solver->sums().momentum;
         EXPECT_NEAR(end[0] / start[0], 1, 1e-10) << method;
         EXPECT_NEAR(end[1] / start[1], 1, 1e-10) << method;
@@ -181,10 +186,12 @@ TEST(FreeFlight, MomentumAndNoStress)
 TEST(FreeFlight, LiteralFrontierLosesMomentum)
 {
     double start = 0;
-    const State s = run("free_flight", "lpfdm-2000", {"lpfdm.frontier=literal"}, [&](const State& now) {
-        if (now.t == 0)
-            start = now.solver->sums().momentum[0];
-    });
+    const State s = run("free_flight", "lpfdm-2000", {"lpfdm.frontier=literal"},
+                        [&](const State& now)
+                        {
+                            if (now.t == 0)
+                                start = now.solver->sums().momentum[0];
+                        });
     EXPECT_LT(s.solver->sums().momentum[0] / start, 0.97);
 }
 
@@ -194,16 +201,18 @@ TEST(RotatingDisk, AngularMomentumAndEnergy)
     for (const std::string method : {"lpfdm-2000", "lpfdm"})
     {
         double start = 0, energy = 0, most = 0;
-        const State s = run("rotating_disk", method, {}, [&](const State& now) {
-            const MotionSums sums = now.solver->sums();
-            double e = sums.kinetic_energy;
-            if (now.t == 0)
-            {
-                start = sums.angular_momentum;
-                energy = e;
-            }
-            most = std::max(most, e / energy);
-        });
+        const State s = run("rotating_disk", method, {},
+                            [&](const State& now)
+                            {
+                                const MotionSums sums = now.solver->sums();
+                                double e = sums.kinetic_energy;
+                                if (now.t == 0)
+                                {
+                                    start = sums.angular_momentum;
+                                    energy = e;
+                                }
+                                most = std::max(most, e / energy);
+                            });
         EXPECT_NEAR(s.solver->sums().angular_momentum / start, 1, 0.05) << method;
         EXPECT_LT(most, 1.03) << method;
     }
@@ -214,7 +223,8 @@ TEST(BodyForce, AxisAlignedManufacturedSolution)
 {
     for (const auto& method : {"lpfdm", "mpm-cpgimp"})
     {
-        const auto error = [&](double L) { return errors(run("axis_aligned", method, {"grid.cell_size=" + std::to_string(L)})).displacement_l2; };
+        const auto error = [&](double L)
+        { return errors(run("axis_aligned", method, {"grid.cell_size=" + std::to_string(L)})).displacement_l2; };
         const double coarse = error(0.125), fine = error(0.0625);
         EXPECT_LT(fine, 0.02) << method;
         EXPECT_GT(std::log2(coarse / fine), 1.5) << method;
