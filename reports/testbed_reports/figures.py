@@ -22,7 +22,6 @@ QUANTITY_NAMES = {
     ("stress", "l1_yy"): r"Vertical stress error, $L_1$", ("displacement", "l2"): "Displacement error, $L_2$",
     ("displacement", "linf"): r"Displacement error, $L_\infty$",
     ("displacement", "rms_scaled"): "Displacement error, scaled RMS",
-    ("displacement", "rms_scaled_max"): "Displacement error, largest scaled RMS",
     ("static", "kinetic_over_strain"): "Kinetic / strain energy", ("static", "unbalanced"): "Unbalanced force ratio",
     ("first_peak", "ratio"): "First peak / static", ("first_peak", "time"): "Time of first peak / exact",
     ("energy_drift", "per_period"): "Energy drift per period", ("energy_gain", "max"): "Largest energy gain",
@@ -38,10 +37,6 @@ HISTORY_NAMES = {"kinetic_energy": ("Kinetic energy", "J/m"), "strain_energy": (
                  "angular_momentum": ("Angular momentum", "kg m/s"),
                  "linear_momentum_x": ("Momentum $p_x$", "kg/s"), "linear_momentum_y": ("Momentum $p_y$", "kg/s"),
                  "linear_momentum": ("Momentum $|p|$", "kg/s")}
-
-
-# An error below this is rounding: its method is exact here and would flatten the picture of the others.
-ROUNDING = 1e-9
 
 
 class FigureError(Exception):
@@ -222,7 +217,7 @@ def convergence(study, entry, style):
     notes, labels, fits = [], {}, {}
     exact = {}
     if metrics.is_error(quantity, norm):
-        exact = {label: data for label, (data, _) in series.items() if data.shape[1] and (data[1] < ROUNDING).all()}
+        exact = {label: data for label, (data, _) in series.items() if data.shape[1] and (data[1] < metrics.ROUNDING).all()}
         exact = {} if len(exact) == sum(data.shape[1] > 0 for data, _ in series.values()) else exact
     limits = sorted((entry.get("L_from", math.inf), entry.get("L_to", 0.0)))
     for label, (data, lost) in series.items():
@@ -309,8 +304,8 @@ def work_precision(study, entry, style):
         for run in own:
             key = tuple((k, str(v)) for k, v in run.values.items() if k not in ("repeat", "dt"))
             error, seconds = abs(run.value(quantity, norm)), run.value("solve_s")
-            if math.isfinite(error) and error > 0 and seconds > 0:
-                points.setdefault(key, []).append((run.values.get("L"), error, seconds))
+            if math.isfinite(error) and seconds > 0:  # an error of zero is exact, not lost
+                points.setdefault(key, []).append((run.values.get("L"), max(error, np.finfo(float).tiny), seconds))
             elif seconds > 0:
                 lost.append(seconds)
         rows = [(p[0][0], np.mean([q[1] for q in p]), *np.percentile([q[2] for q in p], [50, 0, 100]))
@@ -321,7 +316,7 @@ def work_precision(study, entry, style):
         without = [r for r in own if not r.value("solve_s") > 0]
         if without:
             notes.append(f"{label}: {len(without)} of {len(own)} runs have no result")
-    exact = [label for label, s in series.items() if len(s) and (s[:, 1] < ROUNDING).all()]
+    exact = [label for label, s in series.items() if len(s) and (s[:, 1] < metrics.ROUNDING).all()]
     exact = [] if len(exact) == sum(len(s) > 0 for s in series.values()) or not metrics.is_error(quantity, norm) else exact
     finite = np.concatenate([s for label, s in series.items() if len(s) and label not in exact] or [np.empty((0, 5))])
     if not len(finite):

@@ -82,10 +82,10 @@ def _ratio_note(runs):
     return [f"Largest kinetic/strain energy ratio of these runs: {number(max(ratios))}."] if ratios else []
 
 
-def _groups(study):
+def _groups(study, leave_out=()):
     """Runs by variant, and within by further axes than method, cell size and repeats, as labels."""
     further = [k for run in study.runs for k in run.values
-               if k not in ("scene", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "grid.cell_size")]
+               if k not in ("scene", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "grid.cell_size", *leave_out)]
     varying = [k for k in dict.fromkeys(further) if len({str(r.values[k]) for r in study.runs if k in r.values}) > 1]
     groups = {}
     for run in study.runs:
@@ -95,59 +95,64 @@ def _groups(study):
 
 
 def convergence_table(study, quantity, norm):
-    """Rows: cell sizes; per variant the value and, for errors, the order from the row above. None for one size."""
+    """Rows: variants; per cell size the value and, for errors, the order from the size before. None for one size."""
     groups, ordered = _groups(study), metrics.is_error(quantity, norm)
-    data, sizes = {}, set()
+    data = {}
     for label, runs in groups.items():
         if any((quantity, norm) in run.rows for run in runs) or any(not run.completed for run in runs):
             size, mean, _ = mean_by_size(runs, quantity, norm)
             data[label] = (size[::-1], mean[::-1], runs)
-            sizes.update(size)
+    sizes = sorted({size for own, _, _ in data.values() for size in own}, reverse=True)
     if len(sizes) < 2:
         return None
-    header = ["L [m]"]
-    for label in data:
-        header += [label, f"{label} order"] if ordered else [label]
+    header = ["variant"]
+    for k, size in enumerate(sizes):
+        header += [f"L = {size:g} m"] + (["order"] if ordered and k else [])
+    header += ["fitted order"] if ordered else []
     rows = []
-    for size in sorted(sizes, reverse=True):
-        row = [f"{size:g}"]
-        for own_sizes, mean, runs in data.values():
-            at = np.flatnonzero(own_sizes == size)
-            if not len(at):
-                row += ["", ""] if ordered else [""]
-                continue
+    for label, (own, mean, runs) in data.items():
+        # an error of rounding has no order
+        orders = np.where(mean > metrics.ROUNDING, pairwise_orders(own, mean), np.nan)
+        row = [label]
+        for k, size in enumerate(sizes):
+            at = np.flatnonzero(own == size)
+            value, order = (mean[at[0]], orders[at[0]]) if len(at) else (math.nan, math.nan)
             status = next((r.status for r in runs if r.values.get("L") == size and not r.completed), None)
-            value = mean[at[0]]
-            row.append(number(float(value), digits_of(quantity, norm)) if math.isfinite(value) else status or "n/a")
-            if ordered:
-                order = pairwise_orders(own_sizes, mean)[at[0]]
+            row.append(number(float(value), digits_of(quantity, norm)) if math.isfinite(value)
+                       else status or ("n/a" if len(at) else ""))
+            if ordered and k:
                 row.append(f"{order:.2f}" if math.isfinite(order) else "")
-        rows.append(row)
-    if ordered:
-        row = ["fitted order"]
-        for own_sizes, mean, _ in data.values():
-            fit = fit_order(own_sizes, mean)
-            row += ["", str(fit) if math.isfinite(fit.order) else ""]
+        if ordered:
+            fit = fit_order(own, mean)
+            row.append(str(fit) if math.isfinite(fit.order) and np.nanmax(mean) > metrics.ROUNDING else "")
         rows.append(row)
     title = f"{quantity} {norm} against cell size".replace("_", " ")
     notes = [] if quantity == "static" else _ratio_note(study.runs)
     return Table(f"{quantity}_{norm}".strip("_"), title, header, rows, notes=notes)
 
 
-def values_table(study):
-    """Every number of studies with one cell size: rows are quantities, columns variants."""
-    groups, keys = _groups(study), pairs(study)
-    if not keys:
-        return None
-    rows = []
-    for key in keys:
-        row = [key[0], key[1]]
-        for runs in groups.values():
-            values = [run.value(*key) for run in runs]
-            row.append(_range(sorted(set(v for v in values if math.isfinite(v))), digits_of(*key)) if any(map(math.isfinite, values))
-                       else next((r.status for r in runs if not r.completed), "n/a"))
-        rows.append(row)
-    return Table("values", "Measured quantities", ["quantity", "norm", *groups], rows, 2)
+def values_tables(study):
+    """Every number of studies with one cell size, a table for each case: rows are variants, columns quantities."""
+    tables = []
+    for case in dict.fromkeys(run.values.get("case", "") for run in study.runs if run.rows):
+        groups = {}
+        for label, runs in _groups(study, leave_out=("case",)).items():
+            own = [run for run in runs if run.values.get("case", case) == case]
+            if own:
+                groups[label] = own
+        keys = [key for key in pairs(study) if any(key in run.rows for runs in groups.values() for run in runs)]
+        rows = []
+        for label, runs in groups.items():
+            row = [label]
+            for key in keys:
+                values = [run.value(*key) for run in runs]
+                row.append(_range(sorted(set(v for v in values if math.isfinite(v))), digits_of(*key))
+                           if any(map(math.isfinite, values)) else next((r.status for r in runs if not r.completed), "n/a"))
+            rows.append(row)
+        header = ["variant", *(" ".join(key).replace("_", " ").strip() for key in keys)]
+        title = f"Measured quantities: {case}".replace("_", " ").removesuffix(": ")
+        tables.append(Table(f"values_{case}".rstrip("_"), title, header, rows))
+    return tables
 
 
 def performance_table(study):
@@ -190,6 +195,6 @@ def study_tables(study):
     found = [convergence_table(study, *key) for key in pairs(study)]
     tables = [t for t in found if t]
     if not tables:
-        tables = [t for t in (values_table(study),) if t]
+        tables = values_tables(study)
     performance = performance_table(study)
     return tables + ([performance] if performance else [])
