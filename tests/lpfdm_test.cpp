@@ -15,6 +15,13 @@ std::string with_gravity()
     return test::two_bodies() + "[gravity]\nacceleration = [0.4, -1.3]\n";
 }
 
+/// A square of one material on a lattice of 8 x 8 unit cells.
+std::string one_square(const std::string& material, const std::string& body)
+{
+    return "[grid]\nsize = [8.0, 8.0]\ncell_size = 1.0\n[time]\nend = 1.0\n[[material]]\nname = \"m\"\nlaw = \"linear_elastic\"\n" +
+           material + "\n[[body]]\nname = \"b\"\nmaterial = \"m\"\nshape = \"box\"\n" + body;
+}
+
 /// A grid with random points of random stress, ready for the equations.
 template <class Support>
 struct RandomState
@@ -31,21 +38,7 @@ struct RandomState
         for (Body& body : bodies)
         {
             Points& q = body.points;
-            for (std::size_t p = 0; p < q.count; ++p)
-            {
-                q.x[p] += random(-0.1, 0.1);
-                q.y[p] += random(-0.1, 0.1);
-                q.sxx[p] = random(-1, 1);
-                q.syy[p] = random(-1, 1);
-                q.sxy[p] = random(-1, 1);
-                if (Support::has_box)
-                {
-                    q.half_x[p] *= random(0.5, 3.5);
-                    q.half_y[p] *= random(0.5, 3.5);
-                }
-                else
-                    q.volume[p] *= random(0.5, 2);
-            }
+            random.points(q);
             body.bins.rebuild<Support::has_box>(q, workspace);
             bins.push_back(&body.bins);
         }
@@ -117,29 +110,10 @@ TEST(Forces, PatchOfShiftedPoints)
 {
     const auto inner_force = [](const std::string& method, double shift)
     {
-        Scene scene = test::load(R"toml(
-[grid]
-size = [8.0, 8.0]
-cell_size = 1.0
-[time]
-end = 1.0
-[[material]]
-name = "m"
-law = "linear_elastic"
-density = 1.0
-youngs_modulus = 1.0
-poissons_ratio = 0.0
-[[body]]
-name = "b"
-material = "m"
-shape = "box"
-min = [)toml" + std::to_string(1 + shift) +
-                                     "," + std::to_string(1 + 0.7 * shift) + R"toml(]
-max = [)toml" + std::to_string(6 + shift) +
-                                     "," + std::to_string(6 + 0.7 * shift) + R"toml(]
-points_per_cell = 3
-)toml",
-                                 method);
+        const auto corner = [&](double at) { return "[" + std::to_string(at + shift) + ", " + std::to_string(at + 0.7 * shift) + "]"; };
+        const Scene scene = test::load(one_square("density = 1.0\nyoungs_modulus = 1.0\npoissons_ratio = 0.0",
+                                                  "min = " + corner(1) + "\nmax = " + corner(6) + "\npoints_per_cell = 3\n"),
+                                       method);
         const auto measure = [&]<class Support>(Support)
         {
             LpfdmGrid grid(make_lattice(scene.grid));
@@ -217,29 +191,9 @@ INSTANTIATE_TEST_SUITE_P(Variants, LpfdmOracle,
 /// and decays with it; a linear field is left alone.
 TEST(Hourglass, CheckerboardNeedsControl)
 {
-    const std::string patch = R"toml(
-[constants]
-c = "sqrt(1.2*1e6/1000)"
-[grid]
-size = [8.0, 8.0]
-cell_size = 1.0
-[time]
-end = 1.0
-[[material]]
-name = "m"
-law = "linear_elastic"
-density = 1000.0
-youngs_modulus = 1e6
-poissons_ratio = 0.3
-[[body]]
-name = "b"
-material = "m"
-shape = "box"
-min = [1.0, 1.0]
-max = [7.0, 7.0]
-points_per_cell = 2
-velocity = ["1e-4*c*cos(pi*X)*cos(pi*Y)", 0]
-)toml";
+    const std::string patch = one_square("density = 1000.0\nyoungs_modulus = 1e6\npoissons_ratio = 0.3",
+                                         "min = [1.0, 1.0]\nmax = [7.0, 7.0]\npoints_per_cell = 2\n"
+                                         "velocity = [\"1e-4*sqrt(1.2e3)*cos(pi*X)*cos(pi*Y)\", 0]\n");
     const auto kept = [&](const std::string& method)
     {
         const auto solver = make_lpfdm(test::load(patch, method));

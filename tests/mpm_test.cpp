@@ -20,21 +20,7 @@ void check_virtual_work()
         auto bodies = make_bodies(scene, lattice, {.box = Shape::has_box, .velocity = true});
         Body& body = bodies[1];
         Points& q = body.points;
-        for (std::size_t p = 0; p < q.count; ++p)
-        {
-            q.x[p] += random(-0.1, 0.1);
-            q.y[p] += random(-0.1, 0.1);
-            q.sxx[p] = random(-1, 1);
-            q.syy[p] = random(-1, 1);
-            q.sxy[p] = random(-1, 1);
-            if (Shape::has_box)
-            {
-                q.half_x[p] *= random(0.5, 3.5);
-                q.half_y[p] *= random(0.5, 3.5);
-            }
-            else
-                q.volume[p] *= random(0.5, 2);
-        }
+        random.points(q);
         std::vector<double> workspace;
         body.bins.rebuild<Shape::has_box>(q, workspace);
         Gather gather(lattice.nodes());

@@ -1,6 +1,7 @@
 #pragma once
 /// Reproducible random input for tests.
 
+#include "core/points.hpp"
 #include "core/types.hpp"
 
 #include <algorithm>
@@ -37,6 +38,26 @@ public:
         return v;
     }
     SymTensor<> stress(double size = 1) { return {(*this)(-size, size), (*this)(-size, size), (*this)(-size, size)}; }
+
+    /// Shifts the points, gives them random stresses, and random boxes or volumes.
+    void points(Points& q)
+    {
+        for (std::size_t p = 0; p < q.count; ++p)
+        {
+            q.x[p] += (*this)(-0.1, 0.1);
+            q.y[p] += (*this)(-0.1, 0.1);
+            q.sxx[p] = (*this)(-1, 1);
+            q.syy[p] = (*this)(-1, 1);
+            q.sxy[p] = (*this)(-1, 1);
+            if (q.half_x.active())
+            {
+                q.half_x[p] *= (*this)(0.5, 3.5);
+                q.half_y[p] *= (*this)(0.5, 3.5);
+            }
+            else
+                q.volume[p] *= (*this)(0.5, 2);
+        }
+    }
 
 private:
     std::mt19937 engine_;
