@@ -4,6 +4,7 @@
 #include "tests/oracle.hpp"
 #include "tests/random.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 using namespace testbed;
@@ -110,7 +111,7 @@ TEST(Forces, PatchOfShiftedPoints)
 {
     const auto inner_force = [](const std::string& method, double shift)
     {
-        const auto corner = [&](double at) { return "[" + std::to_string(at + shift) + ", " + std::to_string(at + 0.7 * shift) + "]"; };
+        const auto corner = [&](double at) { return fmt::format("[{}, {}]", at + shift, at + 0.7 * shift); };
         const Scene scene = test::load(one_square("density = 1.0\nyoungs_modulus = 1.0\npoissons_ratio = 0.0",
                                                   "min = " + corner(1) + "\nmax = " + corner(6) + "\npoints_per_cell = 3\n"),
                                        method);
