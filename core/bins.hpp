@@ -92,6 +92,9 @@ private:
         const bool inside = cx >= 0 && cx < lattice_.nx && cy >= 0 && cy < lattice_.ny;  // false for NaN
         if (!inside)
             return outside;
+        if constexpr (!has_box)
+            if (points.volume.active() && !(points.volume[p] > 0))
+                return outside;
         if constexpr (has_box)
         {
             if (!(points.half_x[p] > 0 && points.half_y[p] > 0))

@@ -35,6 +35,7 @@ struct VectorExpression
     Expression x, y;
 
     VectorExpression(const Expr2& text, const Constants& constants) : x(text[0], constants), y(text[1], constants) {}
-    Vec2 operator()(const Place& place) const { return {x(place), y(place)}; }
+    /// @throws ExpressionError if it is not finite
+    Vec2 operator()(const Place& place) const { return {x.finite(place), y.finite(place)}; }
 };
 }  // namespace testbed

@@ -62,12 +62,23 @@ double Expression::operator()(const Place& place) const
     return impl_->parser.Eval();
 }
 
+double Expression::finite(const Place& place) const
+{
+    const double value = (*this)(place);
+    if (!std::isfinite(value))
+        throw ExpressionError("expression '" + impl_->parser.GetExpr() + "' is not finite at x = " + std::to_string(place.x) +
+                              " m, y = " + std::to_string(place.y) + " m");
+    return value;
+}
+
 bool holds_near(const Expression& condition, double x, double y, double reach)
 {
-    for (const double dx : {-reach, reach})
-        for (const double dy : {-reach, reach})
-            if (condition({.X = x + dx, .Y = y + dy, .x = x + dx, .y = y + dy}) != 0)
-                return true;
+    const Vec2 offsets[] = {{0, 0}, {-reach, -reach}, {reach, -reach}, {-reach, reach}, {reach, reach}};
+    for (const auto& [dx, dy] : offsets)
+    {
+        if (condition.finite({.X = x + dx, .Y = y + dy, .x = x + dx, .y = y + dy}) != 0)
+            return true;
+    }
     return false;
 }
 
@@ -75,7 +86,10 @@ double evaluate_constant(const std::string& text, const Constants& constants)
 {
     try
     {
-        const double value = parser_with(text, constants).Eval();
+        const mu::Parser parser = parser_with(text, constants);
+        const double value = parser.Eval();
+        if (parser.GetNumResults() != 1)
+            throw ExpressionError("expression '" + text + "': one value is asked, not a list (a decimal point is '.')");
         if (!std::isfinite(value))
             throw ExpressionError("expression '" + text + "': the value is not finite");
         return value;

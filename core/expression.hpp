@@ -2,6 +2,8 @@
 /// Text expressions of scenes, evaluated by muParser. They know X, Y (initial position), x, y (current position), t and the
 /// scene's constants. Not for use by several threads at once.
 
+#include "core/types.hpp"
+
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -33,6 +35,8 @@ public:
     Expression& operator=(Expression&&) noexcept;
 
     double operator()(const Place& place) const;
+    /// The value. @throws ExpressionError if it is not finite
+    double finite(const Place& place) const;
 
 private:
     struct Impl;
@@ -40,6 +44,7 @@ private:
 };
 
 /// Whether a condition holds at a place or within `reach` of it [m]: a node at 0.30000000000000004 is on the line x <= 0.3.
+/// @throws ExpressionError where it is not a number
 bool holds_near(const Expression& condition, double x, double y, double reach);
 
 /// Value of an expression of constants alone. @throws ExpressionError

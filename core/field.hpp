@@ -31,8 +31,7 @@ public:
     bool active() const { return !data_.empty(); }
     std::size_t bytes() const { return data_.capacity() * sizeof(T); }
 
-    /// Allocates n values, padded so that a pack may be loaded from any of them. The padding holds the same value: what a kernel
-    /// makes of it is masked, but must be finite.
+    /// Allocates n values, padded so that a whole pack may be loaded from any of them.
     void activate(std::size_t n, T value = T{}) { data_.assign(n + pack_size, value); }
 
     T* data() { return data_.data(); }

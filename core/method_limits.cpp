@@ -26,8 +26,9 @@ double largest_youngs_modulus(const Scene& scene, const MaterialSpec& material)
 double critical_time_step(const Scene& scene)
 {
     double limit = std::numeric_limits<double>::infinity();
-    for (const MaterialSpec& m : scene.materials)
+    for (const BodySpec& body : scene.bodies)
     {
+        const MaterialSpec& m = scene.material(body.material);
         const ElasticModuli moduli(largest_youngs_modulus(scene, m), m.poissons_ratio);
         const double wave_speed = std::sqrt(moduli.constrained() / m.density);
         const double isolated = std::sqrt(std::min(1.0, 1 - m.poissons_ratio));

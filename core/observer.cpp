@@ -263,8 +263,11 @@ void Observer::write_history(ResultFile& file) const
             file.dataset("/history/probes/" + probe.name + "/" + s.name, s.unit, s.values, s.columns);
 }
 
-std::string Observer::xdmf(const std::string& name) const
+std::string Observer::xdmf(const std::string& file_name) const
 {
+    std::string name;
+    for (const char c : file_name)
+        name += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
     std::size_t n = 0;
     for (const Body& body : solver_.bodies())
         n += body.points.count;

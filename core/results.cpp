@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <hdf5.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace testbed
@@ -44,6 +45,13 @@ struct ResultFile::Impl
 {
     std::string path, part;
     hid_t file = -1;
+    int lock = -1;  ///< held as long as the part file is ours
+
+    ~Impl()
+    {
+        if (lock >= 0)
+            ::close(lock);
+    }
 
     Handle group(const std::string& name) const
     {
@@ -92,15 +100,27 @@ struct ResultFile::Impl
     }
 };
 
-ResultFile::ResultFile(const std::string& path) : impl_(std::make_unique<Impl>(Impl{path, path + ".part"}))
+ResultFile::ResultFile(const std::string& path) : impl_(std::make_unique<Impl>())
 {
+    impl_->path = path;
+    impl_->part = path + ".part";
     H5dont_atexit();  // its clean-up crashes after a write that failed; every file is closed here
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    // the plain call first: it tells why, and HDF5 does not
-    const int descriptor = ::open(impl_->part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (descriptor < 0)
+    // the plain call first: it tells why, and HDF5 does not; nothing is truncated before the lock is held
+    impl_->lock = ::open(impl_->part.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW, 0666);
+    if (impl_->lock < 0)
         throw OutputError(fmt::format("cannot write '{}': {}", impl_->part, std::strerror(errno)));
-    ::close(descriptor);
+    struct flock whole
+    {
+    };
+    whole.l_type = F_WRLCK;
+    struct stat status
+    {
+    };
+    if (::fstat(impl_->lock, &status) != 0 || !S_ISREG(status.st_mode))
+        throw OutputError(fmt::format("cannot write '{}': it exists and is no file", impl_->part));
+    if (::fcntl(impl_->lock, F_OFD_SETLK, &whole) != 0)
+        throw OutputError(fmt::format("cannot write '{}': another run is writing it", impl_->part));
     impl_->file = H5Fcreate(impl_->part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     if (impl_->file < 0)
     {
@@ -162,11 +182,7 @@ void ResultFile::flush()
 void ResultFile::commit()
 {
     impl_->close();
-    const int descriptor = ::open(impl_->part.c_str(), O_RDONLY | O_CLOEXEC);
-    const bool synced = descriptor >= 0 && ::fsync(descriptor) == 0;
-    if (descriptor >= 0)
-        ::close(descriptor);
-    if (!synced)
+    if (::fsync(impl_->lock) != 0)
         throw OutputError(fmt::format("cannot write '{}': {}", impl_->part, std::strerror(errno)));
     std::error_code error;
     std::filesystem::rename(impl_->part, impl_->path, error);

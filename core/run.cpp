@@ -68,6 +68,8 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
     Outcome out;
     const double end = scene.time.end;
     out.dt = solver.is_static() ? end : scene.time.dt ? *scene.time.dt : scene.time.cfl * solver.critical_time_step(scene);
+    if (!(end / out.dt < 1e12))
+        throw SceneError(fmt::format("{}: time.end = {:.4g} s takes more than 1e12 steps of {:.4g} s", scene.path, end, out.dt));
     const auto total_steps = static_cast<std::int64_t>(std::ceil(end / out.dt * (1 - 1e-12)));
     if (!scene.time.dt)
         out.dt = end / static_cast<double>(total_steps);
@@ -123,8 +125,11 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
             progress.show(t, out.steps);
         }
     }
-    catch (const Diverged& e)
+    catch (const std::runtime_error& e)  // Diverged, or an expression of t that ceases to be finite
     {
+        const bool expression = dynamic_cast<const ExpressionError*>(&e) && out.steps > 0;
+        if (!expression && !dynamic_cast<const Diverged*>(&e))
+            throw;
         out.status = "diverged";
         out.code = ExitCode::diverged;
         out.reason = fmt::format("{} (t = {:.6g} s, step {})", e.what(), t, out.steps);
@@ -219,6 +224,10 @@ int guarded_main(const std::function<int()>& body)
     {
         return fail(ExitCode::bad_scene, e.what());
     }
+    catch (const ExpressionError& e)
+    {
+        return fail(ExitCode::bad_scene, e.what());
+    }
     catch (const std::bad_alloc&)
     {
         return fail(ExitCode::internal, "out of memory: make the lattice smaller or the cells larger");
@@ -235,11 +244,43 @@ std::string default_output(const Scene& scene)
     return (name.empty() ? "result" : name) + "_" + scene.method + ".h5";
 }
 
+namespace
+{
+/// A result may replace a result, and nothing else. @throws SceneError
+void check_output(const std::filesystem::path& output)
+{
+    std::error_code ignored;
+    if (output.extension() != ".h5")
+        throw SceneError(fmt::format("output '{}': the name of a result file ends in .h5", output.string()));
+    if (std::filesystem::exists(output, ignored) && !std::filesystem::is_regular_file(output, ignored))
+        throw SceneError(fmt::format("cannot write '{}': it exists and is no file", output.string()));
+}
+
+/// Writes a whole file or none. @throws OutputError
+void write_text(const std::filesystem::path& path, const std::string& text)
+{
+    const std::filesystem::path part = path.string() + ".part";
+    std::ofstream file(part);
+    file << text;
+    file.close();
+    std::error_code error;
+    if (file)
+        std::filesystem::rename(part, path, error);
+    if (!file || error)
+    {
+        std::filesystem::remove(part, error);
+        throw OutputError(fmt::format("cannot write '{}'; the result itself is whole", path.string()));
+    }
+}
+}  // namespace
+
 ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
 {
     const Stopwatch setup;
     set_threads(options.threads);
     const Scene scene = load_and_warn(options);
+    const std::string output = options.output.empty() ? default_output(scene) : options.output;
+    check_output(output);
     const std::unique_ptr<Solver> solver = make_solver(scene);
     Observer observer(scene, *solver);
     std::size_t points = 0;
@@ -248,7 +289,6 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
     const double setup_seconds = setup.seconds();
 
     catch_signals();
-    const std::string output = options.output.empty() ? default_output(scene) : options.output;
     const auto open = [&]
     {
         try
@@ -269,11 +309,7 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
     file.attribute("/", "reason", out.reason);
 
     file.commit();
-    const auto xdmf_path = std::filesystem::path(output).replace_extension(".xdmf");
-    std::ofstream xdmf(xdmf_path);
-    xdmf << observer.xdmf(std::filesystem::path(output).filename().string());
-    if (!xdmf.flush())
-        throw OutputError(fmt::format("cannot write '{}'", xdmf_path.string()));
+    write_text(std::filesystem::path(output).replace_extension(".xdmf"), observer.xdmf(std::filesystem::path(output).filename().string()));
 
     if (!options.quiet)
         fmt::print(stderr,

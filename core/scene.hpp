@@ -37,7 +37,7 @@ struct TimeSpec
     template <class V>
     void describe(V& v)
     {
-        v.required("end", end, "s", "the run completes at this time");
+        v.required("end", end, "s", "the run completes with the first step that reaches this time");
         v.optional("cfl", cfl, "-", "time step as a share of the critical one");
         v.optional("dt", dt, "s", "time step; replaces cfl");
         v.optional(
@@ -208,7 +208,7 @@ struct LpfdmSpec
         v.choice("convection", convection, {"upwind", "central", "none"}, "form of eq. (13)");
         v.choice("frontier", frontier, {"extrapolate", "literal"},
                  "velocity of nodes reached for the first time: mean of neighbours, or zero");
-        v.optional("hourglass", hourglass, "-", "coefficient of the viscous hourglass force; 0 leaves it out");
+        v.optional("hourglass", hourglass, "-", "coefficient chi of the viscous hourglass force, at most 0.5; 0 leaves it out");
     }
 };
 
@@ -269,7 +269,8 @@ struct Scene
     {
         v.optional("title", title, "", "one line for reports");
         v.optional("method", method, "", "a variant: see `testbed list`");
-        v.named_numbers("constants", constants, "names for the expressions of the scene; L is the cell size, pi is known");
+        v.named_numbers("constants", constants,
+                        "names for the expressions of the scene; pi is known, and the cell size L if it is a number");
         v.table("grid", grid, "the fixed lattice");
         v.table("time", time, "duration and time step");
         v.table("gravity", gravity, "body force, eq. (11)");
@@ -287,7 +288,8 @@ struct Scene
         v.table("fem", fem, "options of the FEM reference");
     }
 
-    std::string case_name() const { return std::filesystem::path(path).parent_path().filename().string(); }
+    /// Name of the folder that holds the scene.
+    std::string case_name() const { return std::filesystem::absolute(path).lexically_normal().parent_path().filename().string(); }
     const MaterialSpec& material(const std::string& name) const;
     /// Constants with L, as expressions see them.
     Constants expression_constants() const;

@@ -20,7 +20,10 @@ void check_unique_names(const std::vector<T>& list, const std::string& key, Prob
 {
     std::set<std::string> seen;
     for (std::size_t k = 0; k < list.size(); ++k)
-        if (!seen.insert(list[k].name).second)
+        if (const std::string& name = list[k].name; name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos ||
+                                                    std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 32; }))
+            problems.add(fmt::format("{}[{}].name", key, k), "a name is not empty and holds no '/' and no control characters");
+        else if (!seen.insert(list[k].name).second)
             problems.add(fmt::format("{}[{}].name", key, k), fmt::format("'{}' is used twice", list[k].name));
 }
 
@@ -112,6 +115,23 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
         }
 }
 
+/// Two boxes in one place would count their mass twice.
+void check_overlap(const Scene& scene, Problems& problems)
+{
+    const double slack = 1e-6 * scene.grid.cell_size;
+    for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+        for (std::size_t other = 0; other < k; ++other)
+        {
+            const BodySpec &a = scene.bodies[other], &b = scene.bodies[k];
+            if (!a.min || !a.max || !b.min || !b.max)
+                continue;
+            bool overlap = true;
+            for (std::size_t d = 0; d < 2; ++d)
+                overlap &= (*a.min)[d] < (*b.max)[d] - slack && (*b.min)[d] < (*a.max)[d] - slack;
+            if (overlap)
+                problems.add(fmt::format("body[{}]", k), fmt::format("body '{}' overlaps body '{}'", b.name, a.name));
+        }
+}
 }  // namespace
 
 void check_scene(const Scene& scene, Problems& problems)
@@ -167,14 +187,16 @@ void check_scene(const Scene& scene, Problems& problems)
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
         check_body(scene, scene.bodies[k], fmt::format("body[{}]", k), problems);
     check_unique_names(scene.bodies, "body", problems);
+    check_overlap(scene, problems);
     check_unique_names(scene.boundaries, "boundary", problems);
     check_unique_names(scene.probes, "probe", problems);
     if (scene.output.history < 0)
         problems.add("output.history", "must not be negative");
-    if (scene.output.snapshots < 0)
-        problems.add("output.snapshots", "must not be negative");
-    if (scene.lpfdm.hourglass < 0 || scene.lpfdm.hourglass > 1)
-        problems.add("lpfdm.hourglass", fmt::format("must lie in [0, 1], not {}", scene.lpfdm.hourglass));
+    if (scene.output.snapshots < 0 || scene.output.snapshots > 9999)
+        problems.add("output.snapshots", "between 0 and 9999 is asked");
+    if (scene.lpfdm.hourglass < 0 || scene.lpfdm.hourglass > 0.5)
+        problems.add("lpfdm.hourglass", fmt::format("must lie in [0, 0.5], beyond that it is unstable at the critical time step; not {}",
+                                                    scene.lpfdm.hourglass));
     if (scene.mpm.flip < 0 || scene.mpm.flip > 1)
         problems.add("mpm.flip", fmt::format("must lie in [0, 1], not {}", scene.mpm.flip));
     if (scene.mpm.strain == "b_bar" && scene.mpm.shape != "linear")

@@ -19,6 +19,13 @@ inline std::string kind_of(const toml::node& node)
     return found == names.end() ? "date or time" : found->second;
 }
 
+inline bool is_identifier(std::string_view name)
+{
+    const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
+    return !name.empty() && letter(name[0]) &&
+           std::all_of(name.begin(), name.end(), [&](char c) { return letter(c) || (c >= '0' && c <= '9'); });
+}
+
 /// Reads one table strictly.
 class Reader
 {
@@ -64,7 +71,7 @@ public:
             optional(key, value, "", doc);
         else
             required(key, value, "", doc);
-        if (!value.empty() && std::find(choices.begin(), choices.end(), value) == choices.end())
+        if ((has_default || find(key)) && std::find(choices.begin(), choices.end(), value) == choices.end())
             problems_.add(full(key), fmt::format("'{}' is not a choice", value) + suggestion(value, choices));
     }
     void expression(const char* key, std::string& value, const char*, const char* doc)
@@ -84,6 +91,13 @@ public:
         if (!table)
             return problems_.add(full(key), "a table is asked, not a " + kind_of(*node));
         const bool defines_names = path_.empty();
+        for (const auto& [name, value] : *table)
+            if (!is_identifier(name.str()))
+            {
+                problems_.remember(full(key) + "." + std::string(name.str()), value);
+                return problems_.add(full(key) + "." + std::string(name.str()),
+                                     "a name is letters, digits and '_', and begins with no digit");
+            }
         // in any order: what depends on another name waits until that one is known
         std::vector<std::pair<std::string, const toml::node*>> waiting;
         for (const auto& [name, value] : *table)
@@ -182,7 +196,8 @@ private:
 
     const toml::node* find(const char* key)
     {
-        known_.emplace_back(key);
+        if (std::find(known_.begin(), known_.end(), key) == known_.end())
+            known_.emplace_back(key);
         const toml::node* node = table_.get(key);
         if (node)
             problems_.remember(full(key), *node);

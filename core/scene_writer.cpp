@@ -18,7 +18,7 @@ std::string in_quotes(const std::string& text)
         case '\\': out += "\\\\"; break;
         case '\n': out += "\\n"; break;
         case '\t': out += "\\t"; break;
-        default: out += c;
+        default: out += static_cast<unsigned char>(c) < 32 ? fmt::format("\\u{:04x}", static_cast<int>(c)) : std::string(1, c);
         }
     return out + "\"";
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// Packs of points. A kernel is written once as a function of (offset, lanes) and is called for whole packs and for
-/// the rest of a bin, where lanes masks what lies behind its end. Fields are padded, so that loads may read over.
+/// the rest of a bin, where lanes masks what lies behind its end.
 
 #include <cstddef>
 #include <experimental/simd>
@@ -23,7 +23,13 @@ class SomeLanes
 {
 public:
     explicit SomeLanes(std::size_t count) : mask_(Pack([](auto i) { return static_cast<double>(i); }) < Pack(static_cast<double>(count))) {}
-    static Pack load(const double* from) { return Pack(from, stdx::element_aligned); }
+    /// Lanes behind the end hold 1, which no kernel stumbles over.
+    Pack load(const double* from) const
+    {
+        Pack v(1.0);
+        stdx::where(mask_, v).copy_from(from, stdx::element_aligned);
+        return v;
+    }
     void store(double* to, Pack v) const { stdx::where(mask_, v).copy_to(to, stdx::element_aligned); }
     Pack keep(Pack v) const
     {

@@ -70,12 +70,18 @@ struct BinFrame
     {
         return corner<Support>(q, p, lanes, lanes.load(&q.x[p]), lanes.load(&q.y[p]));
     }
-    /// Whether the support of one of the points now begins in another bin.
+    /// Whether the support of one of the points now begins in another bin, or one of them is turned inside out; the volume must
+    /// be up to date.
     template <class Support, class Lanes>
     bool left(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
     {
         const Corner c = corner<Support>(q, p, lanes, x, y);
-        return lanes.any(left_bin(c.ax) || left_bin(c.ay));
+        auto out = left_bin(c.ax) || left_bin(c.ay);
+        if constexpr (Support::has_box)
+            out = out || !(lanes.load(&q.half_x[p]) > Pack(0.0)) || !(lanes.load(&q.half_y[p]) > Pack(0.0));
+        else
+            out = out || !(lanes.load(&q.volume[p]) > Pack(0.0));
+        return lanes.any(out);
     }
 };
 

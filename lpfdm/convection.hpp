@@ -1,5 +1,5 @@
 #pragma once
-/// Convection correction of the nodal velocity, eq. (13): du <= du - (du . grad) du.
+/// Convection correction of the nodal velocity: eq. (13), du <= du - (du . grad) du, as printed or solved.
 
 #include "lpfdm/grid.hpp"
 
@@ -10,6 +10,9 @@ namespace testbed
 /// As published: the gradient of the cell that holds the departure point x_k - du; no correction where that cell is empty.
 struct UpwindConvection
 {
+    /// Eq. (13) as printed.
+    static Vec2 correct(const Vec2& v, const Gradient<>& g) { return {v[0] - v[0] * g.xx - v[1] * g.xy, v[1] - v[0] * g.yx - v[1] * g.yy}; }
+
     static Gradient<> gradient(const LpfdmGrid& grid, std::size_t first_cell, double cx, double cy)
     {
         const int k = (cx > 0 ? 1 : 0) + (cy > 0 ? 2 : 0);
@@ -23,6 +26,14 @@ struct UpwindConvection
 /// cell, such as a box makes that reaches over a wall by rounding, would count as much as a full one.
 struct CentralConvection
 {
+    /// The node takes the velocity of what arrives from x - dt v', which for a linear field is (I + G) v' = v. Eq. (13) is its
+    /// first order; what it drops adds up to a gain of angular momentum and energy in rotation.
+    static Vec2 correct(const Vec2& v, const Gradient<>& g)
+    {
+        const double determinant = (1 + g.xx) * (1 + g.yy) - g.xy * g.yx;
+        return {((1 + g.yy) * v[0] - g.xy * v[1]) / determinant, ((1 + g.xx) * v[1] - g.yx * v[0]) / determinant};
+    }
+
     static Gradient<> gradient(const LpfdmGrid& grid, std::size_t first_cell, double cx, double cy)
     {
         Gradient<> mean;
@@ -52,9 +63,9 @@ void convect(LpfdmGrid& grid, double dt)
         {
             double &vx = grid.nodes.vx[i], &vy = grid.nodes.vy[i];
             const Gradient<> g = Scheme::gradient(grid, first_cell, limited(vx), limited(vy));
-            const double dx = vx * g.xx + vy * g.xy, dy = vx * g.yx + vy * g.yy;
-            vx -= dx;
-            vy -= dy;
+            const Vec2 v = Scheme::correct({vx, vy}, g);
+            vx = v[0];
+            vy = v[1];
         });
 }
 }  // namespace testbed

@@ -71,7 +71,7 @@ inline void cell_gradients(LpfdmGrid& grid, double dt)
 }
 
 /// Viscous force against the pattern (+1, -1, -1, +1), which no gradient sees and no linear field contains.
-/// @param rate of decay [1/s] @param amplitude one force per cell of the lattice
+/// The pattern decays at four times the rate. @param rate chi c_p / L [1/s] @param amplitude one force per cell of the lattice
 inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<Vec2>& amplitude)
 {
     grid.for_each_cell(

@@ -74,8 +74,13 @@ public:
             timer_("remap velocity",
                    [&]
                    {
-                       carrier_x_ = nodes_.vx;
-                       carrier_y_ = nodes_.vy;
+                       carrier_x_.resize(nodes_.vx.size());
+                       carrier_y_.resize(nodes_.vy.size());
+                       for (const auto n : nodes_.active)
+                       {
+                           carrier_x_[n] = nodes_.vx[n];
+                           carrier_y_[n] = nodes_.vy[n];
+                       }
                        points_to_nodes<Scatter::momentum>();
                    });
             timer_("points, material", [&] { move_points<true>(carrier_x_, carrier_y_, dt); });

@@ -182,8 +182,12 @@ struct RefLpfdm
                         g = {g.xx + weight * q.xx, g.yy + weight * q.yy, g.xy + weight * q.xy, g.yx + weight * q.yx};
                         total += weight;
                     }
-                if (total > 0)
-                    w = {w[0] - (u.at(k)[0] * g.xx + u.at(k)[1] * g.xy) / total, w[1] - (u.at(k)[0] * g.yx + u.at(k)[1] * g.yy) / total};
+                if (total <= 0)
+                    continue;
+                g = {g.xx / total, g.yy / total, g.xy / total, g.yx / total};
+                const Vec2 before = u.at(k);
+                for (int sweep = 0; sweep < (central ? 60 : 1); ++sweep)  // v' = v - G v', by repetition
+                    w = {before[0] - w[0] * g.xx - w[1] * g.xy, before[1] - w[0] * g.yx - w[1] * g.yy};
             }
         }
         const double sign[] = {1, -1, -1, 1};
