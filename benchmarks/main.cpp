@@ -54,13 +54,12 @@ std::string fields_and_modules(const Scene& scene, Solver& solver)
 {
     std::vector<std::string> fields, modules{find_variant(scene.method).family};
     for (const Body& body : solver.bodies())
-        const_cast<Points&>(body.points)
-            .for_each_field(
-                [&](const auto& f)
-                {
-                    if (std::find(fields.begin(), fields.end(), f.name()) == fields.end())
-                        fields.emplace_back(f.name());
-                });
+        body.points.for_each_field(
+            [&](const auto& f)
+            {
+                if (std::find(fields.begin(), fields.end(), f.name()) == fields.end())
+                    fields.emplace_back(f.name());
+            });
     if (scene.gravity)
         modules.emplace_back("gravity");
     if (scene.damping)

@@ -21,18 +21,28 @@ struct Points
     double mass = 0;            ///< of one point [kg/m]
     double initial_volume = 0;  ///< of one point [m^2]
 
-    /// The one list that reordering, output and accounting walk.
+    /// The one list that reordering, output and accounting walk: f(field) for every active field.
     template <class F>
     void for_each_field(F&& f)
     {
-        for (Field<double>* field : {&x, &y, &X, &Y, &sxx, &syy, &sxy, &volume, &half_x, &half_y, &vx, &vy, &stiffness})
-            if (field->active())
-                f(*field);
-        if (id.active())
-            f(id);
+        visit(*this, f);
+    }
+    template <class F>
+    void for_each_field(F&& f) const
+    {
+        visit(*this, f);
     }
 
     /// Volume of point p; a point with a box needs no volume of its own.
     double current_volume(std::size_t p) const { return half_x.active() ? 4 * half_x[p] * half_y[p] : volume[p]; }
+
+private:
+    template <class Self, class F>
+    static void visit(Self& self, F& f)
+    {
+        const auto if_active = [&](auto&... fields) { ((fields.active() ? f(fields) : void()), ...); };
+        if_active(self.x, self.y, self.X, self.Y, self.sxx, self.syy, self.sxy, self.volume, self.half_x, self.half_y, self.vx, self.vy,
+                  self.stiffness, self.id);
+    }
 };
 }  // namespace testbed

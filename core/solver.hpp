@@ -34,10 +34,10 @@ inline MotionSums nodal_sums(const Lattice& lattice, const Nodes& nodes, double 
 }
 
 /// Bytes of the arrays of all points and of their order.
-inline std::size_t bytes_of(std::vector<Body>& bodies)
+inline std::size_t bytes_of(const std::vector<Body>& bodies)
 {
     std::size_t total = 0;
-    for (Body& body : bodies)
+    for (const Body& body : bodies)
     {
         body.points.for_each_field([&](const auto& field) { total += field.bytes(); });
         total += body.bins.bytes();
@@ -64,7 +64,7 @@ public:
     virtual Vec2 velocity(std::size_t body, std::size_t point) const = 0;
     virtual std::size_t unknowns() const = 0;  ///< nodal unknowns that carry mass
     virtual std::size_t active_cells() const = 0;
-    virtual std::size_t bytes() = 0;  ///< of all arrays
+    virtual std::size_t bytes() const = 0;  ///< of all arrays
     virtual const PhaseTimer& timer() const = 0;
     virtual const char* kinematics() const = 0;  ///< which [exact.*] applies
     /// What time.cfl is a share of: the stability limit, or for an implicit method what it would be about [s].

@@ -77,7 +77,7 @@ double FemSolver::critical_time_step(const Scene& scene)
     return testbed::critical_time_step(scene) / (scene.fem.degree * cells_per_lattice_cell(scene));
 }
 
-std::size_t FemSolver::bytes()
+std::size_t FemSolver::bytes() const
 {
     return bytes_of(bodies_) + elasticity_.bytes() + sampler_.bytes() + 4 * load_.memory_consumption() + factor_bytes();
 }

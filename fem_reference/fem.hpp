@@ -23,7 +23,7 @@ public:
     Vec2 velocity(std::size_t body, std::size_t point) const override { return sampler_.value(velocity_, body, point); }
     std::size_t unknowns() const override { return elasticity_.unknowns(); }
     std::size_t active_cells() const override { return elasticity_.cells(); }
-    std::size_t bytes() override;
+    std::size_t bytes() const override;
     const PhaseTimer& timer() const override { return timer_; }
     const char* kinematics() const override { return "small_strain"; }
     /// The limit of a cell as large as the distance of nodes, without damping.

@@ -113,7 +113,7 @@ public:
 
     std::size_t unknowns() const override { return 2 * nodes_with_mass(nodes_); }
     std::size_t active_cells() const override { return grid_.gather.active().size(); }
-    std::size_t bytes() override
+    std::size_t bytes() const override
     {
         return bytes_of(bodies_) + grid_.bytes() + was_active_.capacity() + workspace_.capacity() * sizeof(double) +
                (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0);

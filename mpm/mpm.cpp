@@ -68,7 +68,7 @@ public:
         // the given initial velocity is that of t = 0: the first kick is half a step
         timer_("acceleration", [&] { accelerate_and_keep_increment(started_ ? dt : 0.5 * dt); });
         started_ = true;
-        timer_("nodes to points", [&] { update_velocity(); });
+        timer_("nodes to points", [&] { options_.flip < 1 ? update_velocity<true>() : update_velocity<false>(); });
         if (options_.scheme == "musl")
         {
             timer_("remap velocity",
@@ -102,7 +102,7 @@ public:
             n += body.bins.list().size();
         return n;
     }
-    std::size_t bytes() override
+    std::size_t bytes() const override
     {
         return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity()) * sizeof(double) +
@@ -189,6 +189,7 @@ private:
     }
 
     /// v_p = flip (v_p + sum N dv) + (1 - flip) sum N v.
+    template <bool with_pic>
     void update_velocity()
     {
         const Pack flip(options_.flip), pic(1 - options_.flip);
@@ -203,7 +204,7 @@ private:
                                   const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
                                   const auto dv = increment.at(at);
                                   Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
-                                  if (options_.flip < 1)
+                                  if constexpr (with_pic)
                                   {
                                       const auto v = total.at(at);
                                       vx = flip * vx + pic * v[0];

@@ -79,6 +79,10 @@ TEST(Bins, RefusePointsOutsideAndNotFinite)
         q.x[4] = x;
         EXPECT_THROW(bins.rebuild<false>(q, workspace), Diverged) << x;
     }
+    Points turned = random_points(10, 9);
+    turned.volume.activate(10, 1.0);
+    turned.volume[4] = -1e-9;  // turned inside out
+    EXPECT_THROW(bins.rebuild<false>(turned, workspace), Diverged);
     Points q = random_points(10, 9);
     q.half_y[4] = -0.1;  // an inverted box
     EXPECT_THROW(bins.rebuild<true>(q, workspace), Diverged);

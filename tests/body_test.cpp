@@ -77,5 +77,10 @@ TEST(CriticalTimeStep, IsolatedCellAndDamping)
     const Scene scene = test::load(test::two_bodies(), "", {"material.stiff.youngs_modulus=1e4", "damping.local=0.8"});
     const double M = ElasticModuli(1e4, 0.3).constrained();
     EXPECT_NEAR(critical_time_step(scene), 0.5 / std::sqrt(M / 1000) * std::sqrt(0.7 / 1.8), 1e-12);
+    Scene with_another = scene;
+    with_another.materials.push_back(scene.materials[0]);
+    with_another.materials.back().name = "unused";
+    with_another.materials.back().youngs_modulus = "1e30";
+    EXPECT_DOUBLE_EQ(critical_time_step(with_another), critical_time_step(scene));
     EXPECT_NEAR(time_step(scene), 0.5 * critical_time_step(scene), 1e-15);
 }

@@ -47,4 +47,6 @@ TEST(Expression, HoldsNearALine)
     EXPECT_EQ(line({.x = 3 * 0.1}), 0);
     EXPECT_TRUE(holds_near(line, 3 * 0.1, 0, 1e-7));
     EXPECT_FALSE(holds_near(line, 0.31, 0, 1e-7));
+    EXPECT_TRUE(holds_near(Expression("y == 0.5", {}), 3, 0.5, 1e-7));
+    EXPECT_THROW(holds_near(Expression("0/0", {}), 0, 0, 1e-7), ExpressionError);
 }

@@ -109,7 +109,7 @@ TEST(Forces, VirtualWorkDomainSupport)
 /// fill the cells evenly.
 TEST(Forces, PatchOfShiftedPoints)
 {
-    const auto inner_force = [](const std::string& method, double shift)
+    const auto inner_force = [](const std::string& method, double shift, double stretch = 1.0)
     {
         const auto corner = [&](double at) { return fmt::format("[{}, {}]", at + shift, at + 0.7 * shift); };
         const Scene scene = test::load(one_square("density = 1.0\nyoungs_modulus = 1.0\npoissons_ratio = 0.0",
@@ -122,7 +122,16 @@ TEST(Forces, PatchOfShiftedPoints)
             std::vector<double> workspace;
             Points& q = bodies[0].points;
             for (std::size_t p = 0; p < q.count; ++p)
+            {
                 q.sxx[p] = q.syy[p] = q.sxy[p] = 1;
+                q.x[p] = 3.5 + stretch * (q.x[p] - 3.5);
+                q.y[p] = 3.5 + stretch * (q.y[p] - 3.5);
+                if (Support::has_box)
+                {
+                    q.half_x[p] *= stretch;
+                    q.half_y[p] *= stretch;
+                }
+            }
             bodies[0].bins.template rebuild<Support::has_box>(q, workspace);
             const Bins* bins = &bodies[0].bins;
             grid.template rebuild<Support::S>({&bins, 1});
@@ -141,6 +150,8 @@ TEST(Forces, PatchOfShiftedPoints)
     EXPECT_LT(inner_force("lpfdm", 0.0), 1e-12);
     EXPECT_LT(inner_force("lpfdm", 0.13), 1e-12);
     EXPECT_LT(inner_force("lpfdm-2000", 0.13), 1e-12);  // still three points per cell and row
+    EXPECT_LT(inner_force("lpfdm", 0.13, 1.07), 1e-12);
+    EXPECT_GT(inner_force("lpfdm-2000", 0.13, 1.07), 0.1);  // some cells hold two, others three
 }
 
 /// Every variant against the oracle, with points that change cells and nodes that are reached and left.

@@ -142,10 +142,27 @@ TEST(Scene, BadInput)
     expect_problem({"mpm.flip=1.5"}, {"mpm.flip"});
     expect_problem({"fem.degree=3"}, {"fem.degree"});
     expect_problem({"body.nobody.radius=1"}, {"no entry 'nobody'"});
+    expect_problem({"body.block.shape=\"\""}, {"'' is not a choice"});
+    expect_problem({"lpfdm.support=\"\""}, {"'' is not a choice"});
+    expect_problem({"body.block.name=\"a/b\""}, {"body[0].name"});
+    expect_problem({"constants.a-b=1"}, {"constants.a-b", "letters"});
+    expect_problem({"constants.H=\"4,5\""}, {"not a list"});
+    expect_problem({"output.snapshots=20000"}, {"output.snapshots"});
+    expect_problem({"lpfdm.hourglass=0.6"}, {"lpfdm.hourglass"});
     expect_problem({"novalue"}, {"--set key.path=value"});
     expect_problem({"title.a=1"}, {"title"});
     expect_problem({"boundary=3"}, {"[[boundary]]"});
     expect_problem({"exact.finite_strain.stress=[0,0,0,0]"}, {"finite_strain"});
+}
+
+TEST(Scene, OverlappingBoxes)
+{
+    const auto with_second = [](const std::string& low, const std::string& high)
+    {
+        return minimal + "[[body]]\nname = \"other\"\nmaterial = \"soil\"\nshape = \"box\"\nmin = " + low + "\nmax = " + high + "\n";
+    };
+    EXPECT_NE(problems_of(with_second("[0.5, 0.5]", "[1.5, 1.0]")).find("body 'other' overlaps body 'block'"), std::string::npos);
+    EXPECT_EQ(problems_of(with_second("[1.0, 0.0]", "[2.0, 2.0]")), "");  // side by side
 }
 
 TEST(Scene, MissingBodyOrTable)

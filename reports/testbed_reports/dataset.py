@@ -61,6 +61,21 @@ class Study:
         return list(dict.fromkeys(run.name for run in self.runs))
 
 
+# What makes no line of its own in a table or an order.
+NO_SERIES = ("scene", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "grid.cell_size")
+
+
+def groups(runs, leave_out=()):
+    """Runs by variant, and within by further axes than method, cell size and repeats, as labels."""
+    further = [k for run in runs for k in run.values if k not in NO_SERIES and k not in leave_out]
+    varying = [k for k in dict.fromkeys(further) if len({str(r.values[k]) for r in runs if k in r.values}) > 1]
+    found = {}
+    for run in runs:
+        parts = [run.name] + [f"{k.rsplit('.', 1)[-1]} = {run.values.get(k)}" for k in varying]
+        found.setdefault(", ".join(parts), []).append(run)
+    return found
+
+
 def write_atomically(path, text):
     """Writes a whole file or none."""
     path = Path(path)
@@ -73,7 +88,7 @@ def read_run(folder, entry):
     """A run from its folder; never raises for a bad file, but says so in `reason`."""
     folder = Path(folder)
     values = {**entry.get("axes", {}), "repeat": entry.get("repeat", 1)}
-    for key in ("method", "variant", "L", "ppc", "seed"):
+    for key in ("case", "method", "variant", "L", "ppc", "seed"):
         if entry.get(key) not in (None, ""):
             values[key] = entry[key]
     run = Run(entry["id"], folder, values, "missing", entry.get("outcome", "") or "not run yet")

@@ -174,7 +174,7 @@ def main(arguments=None):
     out = Path(options.output) if options.output else Path(options.folders[0]).resolve().parent / "report"
     try:
         page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]))
-    except StudyError as error:
+    except (StudyError, OSError) as error:
         print(f"testbed report: {error}", file=sys.stderr)
         return 1
     print(os.path.relpath(page))

@@ -86,7 +86,7 @@ class Result:
                 self.histories = [name for name, node in file.get("history", {}).items()
                                   if isinstance(node, h5py.Dataset)]
                 self.snapshots = [Snapshot(self, name, _attributes(node), set(node))
-                                  for name, node in sorted(file.get("snapshots", {}).items())]
+                                  for name, node in sorted(file.get("snapshots", {}).items(), key=lambda item: (len(item[0]), item[0]))]
         except ResultError:
             raise
         except Exception as error:  # h5py raises many kinds for a damaged file

@@ -39,8 +39,24 @@ def find_testbed():
     raise StudyError("no 'testbed' executable: build it, put it on PATH, or set TESTBED")
 
 
+def family(method):
+    """The family of a variant: 'mpm' of 'mpm-linear'."""
+    return method.split("-")[0]
+
+
 def is_fem(method):
-    return method.split("-")[0] == "fem"
+    return family(method) == "fem"
+
+
+def case_of(combination):
+    """The name of the folder that holds the scene, as the solver writes it."""
+    return combination.scene.resolve().parent.name
+
+
+def points_per_cell(resolved):
+    """Of the first body of a resolved scene."""
+    bodies = resolved.get("body") or [{}]
+    return bodies[0].get("points_per_cell")
 
 
 def digest(*parts, length=8):
@@ -107,7 +123,7 @@ def expand(study, testbed, folder, keep, jobs):
     for combination in study.combinations:
         method = combination.method or method_of(combination.scene)
         if is_fem(method) and binaries[True] is None:
-            left_out.append({"axes": combination.axes, "variant": method, "method": "fem",
+            left_out.append({"axes": combination.axes, "case": case_of(combination), "variant": method, "method": "fem",
                              "L": combination.axes.get("grid.cell_size"), "reason": FEM_MISSING})
         else:
             chosen.append((combination, method))
@@ -133,7 +149,8 @@ def expand(study, testbed, folder, keep, jobs):
                 old = [p for p in runs.glob(f"{stem}-*") if is_finished(p / "result.h5")]
                 if old:
                     run_id = max(old, key=lambda p: p.stat().st_mtime).name
-            entries.append({"id": run_id, "variant": method, "L": resolved.get("grid", {}).get("cell_size"),
+            entries.append({"id": run_id, "case": case_of(combination), "method": family(method), "variant": method,
+                            "L": resolved.get("grid", {}).get("cell_size"), "ppc": points_per_cell(resolved),
                             "axes": combination.axes, "repeat": repeat, "outcome": ""})
             out = runs / run_id
             if not is_finished(out / "result.h5"):
@@ -276,7 +293,7 @@ def main(arguments=None):
                 verdicts = judge_all(data)
                 passed = passed and all(v.verdict != "fail" for v in verdicts)
                 print(f"{study.name}: {study.title}\n{as_text(verdicts)}", flush=True)
-    except StudyError as error:
+    except (StudyError, OSError) as error:
         print(f"testbed study: {error}", file=sys.stderr)
         return BAD
     except KeyboardInterrupt:

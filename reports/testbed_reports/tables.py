@@ -9,6 +9,7 @@ import numpy as np
 
 from . import metrics
 from .convergence import fit_order, pairwise_orders
+from .dataset import groups
 from .targets import digits_of, mean_by_size, number
 
 
@@ -63,7 +64,7 @@ def _range(values, digits=3):
     if not values:
         return "n/a"
     middle = number(statistics.median(values), digits)
-    return middle if len(values) < 2 else f"{middle} [{number(min(values), digits)}–{number(max(values), digits)}]"
+    return middle if min(values) == max(values) else f"{middle} [{number(min(values), digits)}–{number(max(values), digits)}]"
 
 
 def _whole(value):
@@ -82,23 +83,11 @@ def _ratio_note(runs):
     return [f"Largest kinetic/strain energy ratio of these runs: {number(max(ratios))}."] if ratios else []
 
 
-def _groups(study, leave_out=()):
-    """Runs by variant, and within by further axes than method, cell size and repeats, as labels."""
-    further = [k for run in study.runs for k in run.values
-               if k not in ("scene", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "grid.cell_size", *leave_out)]
-    varying = [k for k in dict.fromkeys(further) if len({str(r.values[k]) for r in study.runs if k in r.values}) > 1]
-    groups = {}
-    for run in study.runs:
-        parts = [run.name] + [f"{k.rsplit('.', 1)[-1]} = {run.values.get(k)}" for k in varying]
-        groups.setdefault(", ".join(parts), []).append(run)
-    return groups
-
-
 def convergence_table(study, quantity, norm):
     """Rows: variants; per cell size the value and, for errors, the order from the size before. None for one size."""
-    groups, ordered = _groups(study), metrics.is_error(quantity, norm)
+    series, ordered = groups(study.runs), metrics.is_error(quantity, norm)
     data = {}
-    for label, runs in groups.items():
+    for label, runs in series.items():
         if any((quantity, norm) in run.rows for run in runs) or any(not run.completed for run in runs):
             size, mean, _ = mean_by_size(runs, quantity, norm)
             data[label] = (size[::-1], mean[::-1], runs)
@@ -108,7 +97,7 @@ def convergence_table(study, quantity, norm):
     header = ["variant"]
     for k, size in enumerate(sizes):
         header += [f"L = {size:g} m"] + (["order"] if ordered and k else [])
-    header += ["fitted order"] if ordered else []
+    header += ["order of all"] if ordered else []
     rows = []
     for label, (own, mean, runs) in data.items():
         # an error of rounding has no order
@@ -135,18 +124,18 @@ def values_tables(study):
     """Every number of studies with one cell size, a table for each case: rows are variants, columns quantities."""
     tables = []
     for case in dict.fromkeys(run.values.get("case", "") for run in study.runs if run.rows):
-        groups = {}
-        for label, runs in _groups(study, leave_out=("case",)).items():
+        series = {}
+        for label, runs in groups(study.runs, leave_out=("case",)).items():
             own = [run for run in runs if run.values.get("case", case) == case]
             if own:
-                groups[label] = own
-        keys = [key for key in pairs(study) if any(key in run.rows for runs in groups.values() for run in runs)]
+                series[label] = own
+        keys = [key for key in pairs(study) if any(key in run.rows for runs in series.values() for run in runs)]
         rows = []
-        for label, runs in groups.items():
+        for label, runs in series.items():
             row = [label]
             for key in keys:
                 values = [run.value(*key) for run in runs]
-                row.append(_range(sorted(set(v for v in values if math.isfinite(v))), digits_of(*key))
+                row.append(_range(values, digits_of(*key))
                            if any(map(math.isfinite, values)) else next((r.status for r in runs if not r.completed), "n/a"))
             rows.append(row)
         header = ["variant", *(" ".join(key).replace("_", " ").strip() for key in keys)]
@@ -158,7 +147,7 @@ def values_tables(study):
 def performance_table(study):
     """Timings per variant and cell size; runs on a busy machine are marked."""
     cores, rows, busy_any = study.plan.get("cores"), [], False
-    for label, runs in _groups(study).items():
+    for label, runs in groups(study.runs).items():
         for size in sorted({r.values.get("L") for r in runs if r.result is not None}, reverse=True):
             own = [r for r in runs if r.values.get("L") == size and r.result is not None]
             perf = [r.result.performance for r in own]

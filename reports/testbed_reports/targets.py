@@ -6,6 +6,7 @@ import numpy as np
 
 from . import metrics
 from .convergence import fit_order
+from .dataset import groups
 from .study_file import matches
 
 NOT_CONVERGING_ORDER = 0.5
@@ -42,7 +43,8 @@ def digits_of(quantity, norm):
 def asked(target):
     """The target in words."""
     kind, what = target["kind"], " ".join(filter(None, (target["quantity"], target.get("norm", ""))))
-    where = ", ".join(f"{key} = {value}" for key, value in target.get("where", {}).items())
+    where = ", ".join(f"{key} = {' | '.join(map(str, value)) if isinstance(value, list) else value}"
+                      for key, value in target.get("where", {}).items())
     sizes = ""
     if "L_from" in target or "L_to" in target:
         sizes = f" for L {target.get('L_from', '...')} to {target.get('L_to', '...')}"
@@ -116,11 +118,10 @@ def _why(run, quantity, norm):
 
 def _judge_order(target, runs, quantity, norm):
     measured, verdicts, notes = [], [], []
-    names = list(dict.fromkeys(run.name for run in runs))
-    for name in names:
-        own = [run for run in runs if run.name == name]
+    series = groups(runs)
+    for name, own in series.items():
         sizes, means, lost = mean_by_size(own, quantity, norm)
-        prefix = f"{name}: " if len(names) > 1 else ""
+        prefix = f"{name}: " if len(series) > 1 else ""
         if target["kind"] == "not_converging":
             keep = sizes <= np.median(sizes) * (1 + 1e-9) if len(sizes) > 2 else np.ones(len(sizes), bool)
             unfinished = [r for r in lost if r.completed or r.status not in ("diverged",)]
@@ -159,7 +160,7 @@ def judge(target, study):
     if not runs:
         left_out = [e for e in study.left_out
                     if matches({**e.get("axes", {}), "variant": e.get("variant"), "method": e.get("method"),
-                                "L": e.get("L")}, target.get("where", {}))]
+                                "L": e.get("L"), "case": e.get("case")}, target.get("where", {}))]
         if left_out:
             return Verdict(**base, measured="n/a", verdict="not run", note=left_out[0].get("reason", "left out"))
         return Verdict(**base, measured="n/a", verdict="fail", note="no run")

@@ -139,6 +139,92 @@ def test_time_limit(tmp_path):
         assert file.attrs["status"] == "time_limit"
 
 
+SUDDEN = str(ROOT / "benchmarks" / "elastic_column_sudden" / "scene.toml")
+FLIGHT = str(ROOT / "benchmarks" / "free_flight" / "scene.toml")
+DISK = str(ROOT / "benchmarks" / "rotating_disk" / "scene.toml")
+
+
+@pytest.mark.parametrize("method", ["lpfdm", "lpfdm-2000", "mpm-linear", "mpm-cpgimp"])
+@pytest.mark.parametrize("modulus", ["E", "\"2*E*(1-0.7*Y/H)\""])
+def test_energy_balance_of_the_history(tmp_path, method, modulus):
+    """Kinetic + strain energy - work of gravity stays zero at every sample, with a uniform and a varying modulus."""
+    done = run("run", SUDDEN, "--method", method, "--set", "grid.cell_size=0.5", "--set", "material.soil.poissons_ratio=0.2",
+               "--set", f"material.soil.youngs_modulus={modulus}", "-o", tmp_path / "r.h5")
+    assert done.returncode == 0, done.stderr
+    h = datasets(tmp_path / "r.h5")
+    total = h["history/kinetic_energy"] + h["history/strain_energy"] - h["history/gravity_work"]
+    assert np.abs(total).max() < 2e-3 * h["history/strain_energy"].max()
+    assert h["history/gravity_work"].max() > 0.9 * h["history/strain_energy"].max()
+
+
+@pytest.mark.parametrize("method", ["lpfdm", "lpfdm-2000", "mpm-linear", "mpm-cpgimp"])
+def test_momentum_of_free_fall(tmp_path, method):
+    done = run("run", FLIGHT, "--method", method, "--set", "gravity.acceleration=[3.0, -7.0]", "--set", "time.end=0.05",
+               "-o", tmp_path / "r.h5")
+    assert done.returncode == 0, done.stderr
+    h = datasets(tmp_path / "r.h5")
+    t, p = h["history/time"], h["history/linear_momentum"]
+    mass = h["snapshots/0000/mass"].sum()
+    assert np.allclose(p[:, :2] - p[0, :2], mass * np.outer(t, [3.0, -7.0]), rtol=0, atol=1e-9 * np.abs(p).max())
+
+
+def test_velocity_of_points_is_bilinear(tmp_path):
+    assert run("run", DISK, "--set", "time.end=0.001", "-o", tmp_path / "r.h5").returncode == 0
+    h = datasets(tmp_path / "r.h5")
+    x, v = h["snapshots/0000/position"], h["snapshots/0000/velocity"]
+    omega = v[0, 1] / x[0, 0]
+    assert omega > 0 and np.allclose(v[:, 0], -omega * x[:, 1], atol=1e-12) and np.allclose(v[:, 1], omega * x[:, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["lpfdm", "mpm-linear"])
+def test_a_damped_column_stops_at_rest(tmp_path, method):
+    assert run("run", COLUMN, "--method", method, "-o", tmp_path / "r.h5").returncode == 0
+    h = datasets(tmp_path / "r.h5")
+    assert 0.5 < h["history/time"][-1] < 3.9  # after the ramp, before the end
+    assert h["history/unbalanced_force"][-1] < 1e-8
+    assert h["history/kinetic_energy"][-1] < 1e-8 * h["history/strain_energy"][-1]
+
+
+def test_output_replaces_results_only(tmp_path):
+    (tmp_path / "folder.h5").mkdir()
+    os.mkfifo(tmp_path / "pipe.h5.part")
+    for name, told in (("folder.h5", "is no file"), ("pipe.h5", ""), ("x.xdmf", "ends in .h5"), ("scene.toml", "ends in .h5")):
+        done = run("run", COLUMN, "-o", tmp_path / name)
+        assert done.returncode == 1 and told in done.stderr, done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder.h5", "pipe.h5.part"]
+
+
+def test_two_runs_with_one_output(tmp_path):
+    first = subprocess.Popen([TESTBED, "run", SPEED, "--set", "time.end=0.5", "--quiet", "-o", tmp_path / "r.h5"])
+    time.sleep(0.7)
+    done = run("run", SPEED, "-o", tmp_path / "r.h5")
+    assert done.returncode == 1 and "another run" in done.stderr
+    assert first.wait(timeout=120) == 0
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert file.attrs["status"] == "completed"
+
+
+@pytest.mark.parametrize("override", ["time.end=1e300", "time.cfl=1e-300", "body.column.velocity=[\"1/0\", 0]", "boundary.base.where=\"0/0\""])
+def test_nonsense_that_is_valid_syntax(tmp_path, override):
+    done = run("run", COLUMN, "--set", override, "-o", tmp_path / "r.h5")
+    assert done.returncode == 1 and done.stderr.startswith("error: "), done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_points_turned_inside_out_end_as_diverged(tmp_path):
+    done = run("run", SUDDEN, "--method", "lpfdm-2000", "--set", "time.cfl=2.5", "-o", tmp_path / "r.h5")
+    assert done.returncode == 2
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert file.attrs["status"] == "diverged" and file.attrs["reason"]
+
+
+def test_case_is_the_folder_however_the_scene_is_named(tmp_path):
+    done = run("run", "scene.toml", "--set", "time.end=0.01", "-o", tmp_path / "r.h5", cwd=Path(COLUMN).parent)
+    assert done.returncode == 0
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert file.attrs["case"] == "elastic_column"
+
+
 def test_check_says_what_the_scene_uses():
     text = run("check", COLUMN).stdout
     for told in ("half_width_x", "local damping", "bytes per point", "critical", "c_p", "exact solution (hypoelastic)"):

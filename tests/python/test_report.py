@@ -141,7 +141,7 @@ def test_busy_machine_is_marked(report):
 def test_convergence_table(tmp_path):
     study = read_study_folder(write_study(tmp_path / "c", sizes=(2.0, 1.0, 0.5), metrics="stress", change=change))
     table = convergence_table(study, "stress", "l2")
-    assert table.header == ["variant", "L = 2 m", "L = 1 m", "order", "L = 0.5 m", "order", "fitted order"]
+    assert table.header == ["variant", "L = 2 m", "L = 1 m", "order", "L = 0.5 m", "order", "order of all"]
     rows = {row[0]: row for row in table.rows}
     assert rows["lpfdm"][2] == "0.0200" and rows["lpfdm"][3] == "2.00"
     assert rows["mpm-cpgimp"][4] == "diverged" and rows["mpm-linear"][4] == "missing"

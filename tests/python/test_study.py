@@ -220,3 +220,30 @@ def test_a_killed_study_takes_its_children_along(bench):
         except OSError:
             return True
     assert children and all(gone(pid) for pid in children)
+
+
+def test_a_lost_run_counts_against_targets_of_its_family_and_case(bench):
+    bench.write(f"""
+title = "Lost"
+scene = "scene.toml"
+[axes]
+method = ["lpfdm-2000", "lpfdm"]
+[[target]]
+label = "all of the family"
+quantity = "stress"
+norm = "l2"
+where = {{method = "lpfdm"}}
+kind = "value_max"
+value = 1.0
+[[target]]
+label = "all of the case"
+quantity = "stress"
+norm = "l2"
+where = {{case = ["column", "{bench.folder.resolve().name}"]}}
+kind = "value_max"
+value = 1.0
+""")
+    bench.behave(**{"lpfdm-2000": "kill"})
+    done = bench.run("--check")
+    told = [line for line in done.stdout.splitlines() if line.startswith("all of the")]
+    assert len(told) == 2 and all("fail" in line and "lpfdm-2000" in line for line in told), done.stdout
