@@ -178,8 +178,7 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
     }
 }
 
-void write_performance(ResultFile& file, const Scene& scene, Solver& solver, const Outcome& out, double setup_seconds,
-                       std::size_t points)
+void write_performance(ResultFile& file, const Scene& scene, Solver& solver, const Outcome& out, double setup_seconds, std::size_t points)
 {
     const std::string group = "/performance";
     const double particle_steps = static_cast<double>(points) * static_cast<double>(out.steps);

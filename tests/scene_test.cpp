@@ -158,9 +158,7 @@ TEST(Scene, BadInput)
 TEST(Scene, OverlappingBoxes)
 {
     const auto with_second = [](const std::string& low, const std::string& high)
-    {
-        return minimal + "[[body]]\nname = \"other\"\nmaterial = \"soil\"\nshape = \"box\"\nmin = " + low + "\nmax = " + high + "\n";
-    };
+    { return minimal + "[[body]]\nname = \"other\"\nmaterial = \"soil\"\nshape = \"box\"\nmin = " + low + "\nmax = " + high + "\n"; };
     EXPECT_NE(problems_of(with_second("[0.5, 0.5]", "[1.5, 1.0]")).find("body 'other' overlaps body 'block'"), std::string::npos);
     EXPECT_EQ(problems_of(with_second("[1.0, 0.0]", "[2.0, 2.0]")), "");  // side by side
 }
