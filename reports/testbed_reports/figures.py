@@ -655,6 +655,10 @@ def history(study, entry, style):
         title = title.split(" ")[-1] if "$" in title else title
         by = "initial value" if by == "initial" else by
         title, unit = f"{title} / {by.replace('_', ' ') if isinstance(by, str) else number(by)}", ""
+        largest = max(np.nanmax(np.abs(v)) for v in bounded)
+        if 0 < largest < 1e-2:  # the power of ten goes into the label: long tick labels would push it off the page
+            power = 3 * math.floor(math.log10(largest) / 3)
+            unit, factor = rf"$10^{{{power}}}$", 10.0**-power
     else:
         unit, factor = _axis_scale(bounded, unit)
     width = WIDTH[entry.get("width", "column")]
