@@ -4,7 +4,6 @@
 
 #include "core/types.hpp"
 
-#include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>

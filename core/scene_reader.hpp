@@ -84,12 +84,9 @@ public:
     }
     void named_numbers(const char* key, Constants& values, const char*)
     {
-        const toml::node* node = find(key);
-        if (!node)
-            return;
-        const toml::table* table = node->as_table();
+        const toml::table* table = find_table(key);
         if (!table)
-            return problems_.add(full(key), "a table is asked, not a " + kind_of(*node));
+            return;
         const bool defines_names = path_.empty();
         for (const auto& [name, value] : *table)
             if (!is_identifier(name.str()))
@@ -172,12 +169,9 @@ public:
     template <class T>
     void tables(const char* key, std::map<std::string, T>& values, const std::vector<std::string>& names, const char*)
     {
-        const toml::node* node = find(key);
-        if (!node)
-            return;
-        const toml::table* table = node->as_table();
+        const toml::table* table = find_table(key);
         if (!table)
-            return problems_.add(full(key), "a table is asked, not a " + kind_of(*node));
+            return;
         for (const auto& [name, value] : *table)
         {
             const std::string path = full(key) + "." + std::string(name.str());
@@ -202,6 +196,14 @@ private:
         if (node)
             problems_.remember(full(key), *node);
         return node;
+    }
+
+    const toml::table* find_table(const char* key)
+    {
+        const toml::node* node = find(key);
+        if (node && !node->is_table())
+            problems_.add(full(key), "a table is asked, not a " + kind_of(*node));
+        return node ? node->as_table() : nullptr;
     }
 
     template <class T>
