@@ -1,28 +1,34 @@
-"""Components of fields by name: 'stress_yy', 'displacement_y', 'velocity', 'mean_stress'."""
+"""Components of fields by name: 'stress_yy', 'displacement_y', 'velocity', 'mean_stress', 'plastic_shear_strain'."""
 import numpy as np
 
 from . import norms
 from .results import TENSOR, VECTOR, ResultError
 
-SYMBOLS = {"stress": r"\sigma", "displacement": "u", "velocity": "v", "position": "x", "kinetic_energy": None}
+# Fields with components: name -> (what an axis is called, symbol, unit)
+FIELDS = {"stress": ("Stress", r"\sigma", "Pa"), "displacement": ("Displacement", "u", "m"),
+          "velocity": ("Velocity", "v", "m/s"), "position": ("Position", "x", "m"), "reaction": ("Reaction", "R", "N/m")}
+# Fields of one number per point
+SCALARS = {"plastic_shear_strain": ("Plastic shear strain", r"\gamma^\mathrm{p}", ""), "cohesion": ("Cohesion", "c", "Pa"),
+           "friction_angle": ("Friction angle", r"\varphi", "rad")}
 
 
 def split(component):
-    """(field, part) of a component's name; part '' is the magnitude."""
+    """(field, part) of a component's name; part '' is the magnitude, or a field of one number."""
     if component == "mean_stress":
         return "stress", "mean"
-    for name in ("stress", "displacement", "velocity", "position"):
-        if component == name:
-            return name, ""
-        if component.startswith(name + "_"):
-            part = component[len(name) + 1:]
-            if part in (TENSOR if name == "stress" else VECTOR):
-                return name, part
-    raise ResultError(f"unknown component '{component}' (such as stress_yy, mean_stress, displacement_y, velocity)")
+    if component in SCALARS or component in FIELDS:
+        return component, ""
+    name, _, part = component.rpartition("_")
+    if name in FIELDS and part in (TENSOR if name == "stress" else VECTOR):
+        return name, part
+    raise ResultError(f"unknown component '{component}' (such as stress_yy, mean_stress, displacement_y, velocity, "
+                      f"{', '.join(SCALARS)})")
 
 
 def pick(values, name, part):
-    """(N,) from a field (N, 3) or (N, 6)."""
+    """(N,) from a field (N,), (N, 3) or (N, 6)."""
+    if name in SCALARS:
+        return values
     if name == "stress":
         if part == "mean":
             return values[:, [TENSOR["xx"], TENSOR["yy"], TENSOR["zz"]]].mean(axis=1)
@@ -31,16 +37,18 @@ def pick(values, name, part):
 
 
 def default_unit(name):
-    return {"stress": "Pa", "displacement": "m", "velocity": "m/s", "position": "m"}[name]
+    return (FIELDS | SCALARS)[name][2]
 
 
 def symbol(component):
     """What an axis is called: words and the symbol."""
     name, part = split(component)
+    words, letter, _ = (FIELDS | SCALARS)[name]
     if part == "mean":
         return r"Mean stress $\sigma_\mathrm{m}$"
-    words = {"stress": "Stress", "displacement": "Displacement", "velocity": "Velocity", "position": "Position"}[name]
-    return f"{words} ${SYMBOLS[name]}_{{{part}}}$" if part else f"{words} $|{SYMBOLS[name]}|$"
+    if name in SCALARS:
+        return f"{words} ${letter}$"
+    return f"{words} ${letter}_{{{part}}}$" if part else f"{words} $|{letter}|$"
 
 
 def of_snapshot(snapshot, component, exact=False):

@@ -67,7 +67,8 @@ NO_SERIES = ("scene", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "
 
 def groups(runs, leave_out=()):
     """Runs by variant, and within by further axes than method, cell size and repeats, as labels."""
-    further = [k for run in runs for k in run.values if k not in NO_SERIES and k not in leave_out]
+    further = [k for run in runs for k in run.values
+               if k not in NO_SERIES and k not in leave_out and not k.endswith(".seed")]
     varying = [k for k in dict.fromkeys(further) if len({str(r.values[k]) for r in runs if k in r.values}) > 1]
     found = {}
     for run in runs:

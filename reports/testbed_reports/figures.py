@@ -3,149 +3,21 @@
 What a run did not give is shown (top rail) or told in the notes, never dropped in silence.
 """
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import NullFormatter
 
 from . import components, metrics
 from .components import of_snapshot
 from .convergence import fit_order
+from .curves import curve, history
+from .drawing import (QUANTITY_NAMES, Drawing, FigureError, axis_scale, by_series, chosen, label_of, log_y, name_of, one_size, short,
+                      sizes_axis, snapshot_of, where_of_title, with_result, with_unit)
+from .maps import field_maps
 from .results import ResultError
-from .style import EXACT, RAIL, WIDTH, frame, legend_below, legend_shape, nice_unit, plt
+from .style import EXACT, RAIL, WIDTH, frame, legend_below, legend_shape
 from .targets import number
-
-QUANTITY_NAMES = {
-    ("stress", "l2"): "Stress error, $L_2$", ("stress", "linf"): r"Stress error, $L_\infty$",
-    ("stress", "l1_yy"): r"Vertical stress error, $L_1$", ("displacement", "l2"): "Displacement error, $L_2$",
-    ("displacement", "linf"): r"Displacement error, $L_\infty$",
-    ("displacement", "rms_scaled"): "Displacement error, scaled RMS",
-    ("static", "kinetic_over_strain"): "Kinetic / strain energy", ("static", "unbalanced"): "Unbalanced force ratio",
-    ("first_peak", "ratio"): "First peak / static", ("first_peak", "time"): "Time of first peak / exact",
-    ("energy_drift", "per_period"): "Energy drift per period", ("energy_gain", "max"): "Largest energy gain",
-    ("kinetic_energy", "retained"): "Kinetic energy retained", ("momentum", "error"): "Momentum error",
-    ("angular_momentum", "retained"): "Angular momentum retained",
-    ("angular_momentum", "error"): "Angular momentum error",
-    ("spurious_stress", "max"): "Largest stress / Young's modulus",
-    ("particle_steps_per_second", ""): "Particle steps per second [1/s]", ("bytes_per_point", ""): "Memory [B/point]",
-    ("solve_s", ""): "Solve time [s]"}
-HISTORY_NAMES = {"kinetic_energy": ("Kinetic energy", "J/m"), "strain_energy": ("Strain energy", "J/m"),
-                 "gravity_work": ("Work of gravity", "J/m"), "total_energy": ("Total energy", "J/m"),
-                 "unbalanced_force": ("Unbalanced force ratio", ""), "max_stress": ("Largest stress", "Pa"),
-                 "angular_momentum": ("Angular momentum", "kg m/s"),
-                 "linear_momentum_x": ("Momentum $p_x$", "kg/s"), "linear_momentum_y": ("Momentum $p_y$", "kg/s"),
-                 "linear_momentum": ("Momentum $|p|$", "kg/s")}
-
-
-class FigureError(Exception):
-    """A figure that cannot be drawn; the message says why."""
-
-
-@dataclass
-class Drawing:
-    """A drawn figure, the runs it shows, and notes for its caption."""
-    figure: object
-    runs: list
-    notes: list = field(default_factory=list)
-
-
-def name_of(quantity, norm):
-    """What a quantity is called on an axis."""
-    if quantity == "settlement":
-        return f"Settlement error, {norm}"
-    return QUANTITY_NAMES.get((quantity, norm), f"{quantity} {norm}".replace("_", " ").strip())
-
-
-def short(key, value):
-    key = {"grid.cell_size": "L"}.get(key, key.rsplit(".", 1)[-1])
-    return f"{key} = {value:g}" if isinstance(value, float) else f"{key} = {value}"
-
-
-def label_of(run, entry):
-    """The name of the series a run belongs to."""
-    parts = [str(run.values.get(k, "?")) if k in ("variant", "method") else short(k, run.values.get(k, "?"))
-             for k in entry["series"]]
-    return ", ".join(parts)
-
-
-def chosen(study, entry):
-    runs = study.select(entry["where"])
-    if not runs:
-        raise FigureError("no run of the study is chosen by 'where'")
-    return runs
-
-
-def by_series(runs, entry, style):
-    """Runs grouped by series, in the order of the style."""
-    groups = {}
-    for run in runs:
-        groups.setdefault(label_of(run, entry), []).append(run)
-    return dict(sorted(groups.items(), key=lambda item: style.rank(item[0])))
-
-
-def one_size(runs, entry):
-    """Runs at the asked cell size(s), else at the finest that is planned for all variants."""
-    asked = entry.get("L")
-    if asked is not None:
-        sizes = asked if isinstance(asked, list) else [asked]
-        found = [r for r in runs if any(math.isclose(r.values.get("L") or -1, s, rel_tol=1e-9) for s in sizes)]
-        if not found:
-            raise FigureError(f"no run has L = {asked}")
-        return found
-    per_variant = {}
-    for run in runs:
-        if isinstance(run.values.get("L"), (int, float)):
-            per_variant.setdefault(run.name, set()).add(run.values["L"])
-    if not per_variant:
-        raise FigureError("no run has a cell size")
-    common = set.intersection(*per_variant.values())
-    finest = min(common) if common else None
-    return [r for r in runs if (r.values.get("L") == finest if finest is not None
-                                else r.values.get("L") == min(per_variant.get(r.name, {math.inf})))]
-
-
-def with_result(runs, notes, completed=True):
-    """The first repeat of each run that can be shown; the others are told."""
-    good, seen = [], set()
-    for run in runs:
-        key = tuple((k, str(v)) for k, v in run.values.items() if k not in ("repeat", "dt"))
-        if run.result is None or (completed and not run.completed):
-            notes.append(f"{run.name} ({short('L', run.values.get('L', '?'))}) is not shown: {run.status}")
-        elif key not in seen:
-            seen.add(key)
-            good.append(run)
-    if not good:
-        raise FigureError("no run has a result to show: " + "; ".join(dict.fromkeys(notes)))
-    notes[:] = list(dict.fromkeys(notes))
-    return good
-
-
-def _sizes_axis(axis, values, formatter="{:g}"):
-    """A log axis ticked at the values that occur, thinned until the labels fit."""
-    values = sorted(set(values))
-    shown, last = [], None
-    span = math.log(values[-1] / values[0]) if len(values) > 1 else 1.0
-    for value in values:
-        if last is None or math.log(value / last) > 0.11 * span:
-            shown.append(value)
-            last = value
-    axis.set_major_locator(FixedLocator(shown))
-    axis.set_major_formatter(FuncFormatter(lambda v, _: formatter.format(v)))
-    axis.set_minor_locator(FixedLocator(values))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def _log_y(axis, low, high):
-    """Ticks of a log axis that are readable over a small range as well."""
-    axis.set_ylim(low, high)
-    if math.log10(high / low) < 1.3:
-        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        axis.yaxis.set_minor_locator(NullLocator())
-    else:
-        axis.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _triangle(axis, orders, points, x_low, x_high):
@@ -272,13 +144,13 @@ def convergence(study, entry, style):
         axis.set_yscale("log")
         if entry.get("orders"):
             low = min(low, _triangle(axis, entry["orders"], finite, min(everything), max(everything)))
-        _log_y(axis, low / 1.6, high)
+        log_y(axis, low / 1.6, high)
     else:  # a ratio, not an error
         margin = 0.15 * (top - low) or 0.1 * abs(top)
         axis.set_ylim(low - margin, top + margin)
     span = max(everything) / min(everything)
     axis.set_xlim(min(everything) / span**0.05 / 1.02, max(everything) * span**0.05 * 1.02)
-    _sizes_axis(axis.xaxis, everything)
+    sizes_axis(axis.xaxis, everything)
     axis.set_xlabel(X_NAMES.get(x, x))
     axis.set_ylabel(name_of(quantity, norm))
     _rails(axis, failing, style, "failed")
@@ -339,7 +211,7 @@ def work_precision(study, entry, style):
     high = min(finite[:, 1].max(), 10 * finite[finite[:, 0] >= finite[:, 0].max() / 1.001][:, 1].max())
     if finite[:, 1].max() > 1.6 * high:
         notes.append("Errors above the upper edge are off the scale")
-    _log_y(axis, finite[:, 1].min() / 1.6, high * 1.6)
+    log_y(axis, finite[:, 1].min() / 1.6, high * 1.6)
     every = np.concatenate([s[:, k] for s in series.values() if len(s) for k in (3, 4)] + list(failing.values()))
     axis.set_xlim(every.min() / 1.5, every.max() * 1.5)
     axis.xaxis.set_minor_formatter(NullFormatter())
@@ -351,27 +223,6 @@ def work_precision(study, entry, style):
         notes.append("Methods that are exact to rounding stand on the lower edge")
     notes.insert(0, "Medians of repeats with their range; set-up and output are left out")
     return Drawing(figure, runs, notes)
-
-
-def _axis_scale(values, unit):
-    finite = np.concatenate([np.ravel(v) for v in values])
-    finite = finite[np.isfinite(finite)]
-    return nice_unit(unit, np.max(np.abs(finite)) if len(finite) else 0.0)
-
-
-def _snapshot(run, entry):
-    if not run.result.snapshots:
-        raise ResultError(f"{run.id}: lacks snapshots")
-    try:
-        return run.result.snapshots[entry.get("snapshot", -1)]
-    except IndexError:
-        raise FigureError(f"{run.id} has no snapshot {entry['snapshot']}") from None
-
-
-def _where_of_title(snapshots):
-    """'t = 1.2 s' when all snapshots agree."""
-    times = {f"{s.time:.4g}" for s in snapshots if s.time is not None}
-    return f"At t = {times.pop()} s" if len(times) == 1 else ""
 
 
 def profile(study, entry, style):
@@ -386,7 +237,7 @@ def profile(study, entry, style):
     lines, snapshots = [], []
     for label, own in by_series(runs, entry, style).items():
         for run in sorted(own, key=lambda r: -(r.values.get("L") or 0)):
-            snapshot = _snapshot(run, entry)
+            snapshot = snapshot_of(run, entry.get("snapshot", -1))
             at = snapshot["initial_position"][:, axis_index]
             keep = np.ones(len(at), bool)
             if "band" in entry:
@@ -399,7 +250,7 @@ def profile(study, entry, style):
             lines.append((label, run, at[keep][order], value, exact))
             snapshots.append(snapshot)
     field_name = components.split(component)[0]
-    unit, factor = _axis_scale([v for _, _, _, v, _ in lines],
+    unit, factor = axis_scale([v for _, _, _, v, _ in lines],
                                snapshots[0].unit(field_name) or components.default_unit(field_name))
 
     keys = {"variant": lambda l: l[0], "L": lambda l: short("L", l[1].values["L"]), "none": lambda l: ""}[split_by]
@@ -459,7 +310,7 @@ def profile(study, entry, style):
         axis.locator_params(axis="x", nbins=4)
     for axis in axes.flat[len(panels):]:
         axis.set_visible(False)
-    value_name = f"{components.symbol(component)} [{unit}]"
+    value_name = with_unit(components.symbol(component), unit)
     place_name = f"Initial position ${'Y' if along == 'y' else 'X'}$ [m]"
     x_name, y_name = (value_name, place_name) if along == "y" else (place_name, value_name)
     for r in range(rows):
@@ -472,228 +323,8 @@ def profile(study, entry, style):
     if has_exact:
         handles["exact"] = Line2D([], [], **EXACT)
     legend_below(figure, list(handles.values()), columns_l)
-    notes.insert(0, _where_of_title(snapshots))
+    notes.insert(0, where_of_title(snapshots))
     return Drawing(figure, runs, [n for n in dict.fromkeys(notes) if n])
-
-
-def _squares(snapshot):
-    """Corners (N, 4, 2) of squares with each point's current area, about its current position."""
-    centre = snapshot["position"][:, :2]
-    area = snapshot["volume"] if "volume" in snapshot else snapshot["initial_volume"]
-    half = 0.5 * np.sqrt(np.clip(np.nan_to_num(area), 0.0, None))
-    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
-    return centre[:, None, :] + half[:, None, None] * corners[None]
-
-
-def _limits(values, given=None):
-    """(low, high, map): 1st to 99th percentile; a diverging map about zero when both signs occur."""
-    if given:
-        return given[0], given[1], "RdBu_r" if given[0] < 0 < given[1] else "viridis"
-    finite = np.concatenate(values)
-    finite = finite[np.isfinite(finite)]
-    if not len(finite):
-        return 0.0, 1.0, "viridis"
-    low, high = np.percentile(finite, [1, 99])
-    if low < 0 < high and min(-low, high) > 0.1 * max(-low, high):
-        bound = max(-low, high)
-        return -bound, bound, "RdBu_r"
-    return (low, high, "viridis") if high > low else (low - 0.5, high + 0.5, "viridis")
-
-
-def field_maps(study, entry, style):
-    component, notes = entry["component"], []
-    runs = with_result(one_size(chosen(study, entry), entry), notes)
-    shown = [(label, run, _snapshot(run, entry)) for label, own in by_series(runs, entry, style).items() for run in own]
-    values = [of_snapshot(s, component) for _, _, s in shown]
-    errors = [v - of_snapshot(s, component, True) if components.has_exact(s, component) else None
-              for v, (_, _, s) in zip(values, shown)]
-    with_error = entry.get("error", True) and any(e is not None for e in errors)
-    squares = [_squares(s) for _, _, s in shown]
-    every = np.concatenate([q.reshape(-1, 2) for q in squares])
-    every = every[np.isfinite(every).all(axis=1)]
-    if not len(every):
-        raise FigureError("no point has a finite position")
-    (x0, y0), (x1, y1) = np.percentile(every, 0.1, axis=0), np.percentile(every, 99.9, axis=0)
-    pad = 0.03 * max(x1 - x0, y1 - y0)
-    x0, x1, y0, y1 = x0 - pad, x1 + pad, y0 - pad, y1 + pad
-    name = components.split(component)[0]
-    base = shown[0][2].unit(name) or components.default_unit(name)
-
-    width = WIDTH[entry.get("width", "page")]
-    left, right, gap, top, bottom = 0.5, 1.0, 0.12, 0.28, 0.42
-    room = width - left - right
-    most = max(1, int(room / (1.5 if x1 - x0 > 1.3 * (y1 - y0) else 0.8)))
-    columns = min(entry.get("columns", most), len(shown), max(1, int(room / 0.8)))
-    bands = math.ceil(len(shown) / columns)
-    if "columns" not in entry:
-        columns = math.ceil(len(shown) / bands)  # rows of like length
-    panel = (room - (columns - 1) * gap) / columns
-    height = panel * (y1 - y0) / (x1 - x0)
-    if height > 2.6:  # tall and narrow bodies
-        height, panel = 2.6, 2.6 * (x1 - x0) / (y1 - y0)
-        spread = (room - columns * panel) / max(1, columns - 1) if columns > 1 else 0
-        gap = min(spread, 1.0)
-    kinds = [("value", values)] + ([("error", errors)] if with_error else [])
-    rows = bands * len(kinds)
-    step = height + top
-    total = rows * step + bottom + 0.02
-    figure = plt.figure(figsize=(width, total))
-    for kind_index, (kind, data) in enumerate(kinds):
-        present = [d for d in data if d is not None]
-        unit, factor = _axis_scale([np.percentile(np.abs(d[np.isfinite(d)]), 99) if np.isfinite(d).any() else [0.0]
-                                    for d in present], base)
-        low, high, cmap = _limits([d * factor for d in present], entry.get("range") if kind == "value" else None)
-        if kind == "error":
-            bound = max(abs(low), abs(high)) or 1.0
-            low, high, cmap = -bound, bound, "PuOr"
-        mapped = None
-        for k, (label, run, _) in enumerate(shown):
-            row = kind_index * bands + k // columns
-            y = total - (row + 1) * step
-            axis = figure.add_axes([(left + (k % columns) * (panel + gap)) / width, y / total, panel / width,
-                                    height / total])
-            if data[k] is not None:
-                cells = PolyCollection(squares[k], array=data[k] * factor, cmap=cmap, linewidths=0, antialiased=False,
-                                       rasterized=True)
-                cells.set_clim(low, high)
-                mapped = axis.add_collection(cells)
-            axis.set_xlim(x0, x1)
-            axis.set_ylim(y0, y1)
-            axis.set_aspect("equal")
-            if panel < 0.4:  # room for one number
-                axis.set_xticks([0.0 if x0 <= 0 <= x1 else x0])
-            else:
-                axis.locator_params(axis="x", nbins=2 if panel < 0.8 else 4)
-            axis.locator_params(axis="y", nbins=max(2, min(6, int(height / 0.35))))
-            axis.set_title(label, pad=3, fontsize=8 if len(label) * 0.07 < panel + gap else 6)
-            if k % columns:
-                axis.tick_params(labelleft=False)
-            else:
-                axis.set_ylabel("$y$ [m]")
-            if row == rows - 1 or k + columns >= len(shown) and kind_index == len(kinds) - 1:
-                axis.set_xlabel("$x$ [m]")
-            else:
-                axis.tick_params(labelbottom=False)
-        overhang = max(0.0, (max(len(label) for label, _, _ in shown) * 0.07 - panel) / 2)  # of a long title
-        edge = left + columns * panel + (columns - 1) * gap + 0.12 + min(overhang, 0.3)
-        y_low, y_high = total - (kind_index + 1) * bands * step, total - kind_index * bands * step - top
-        bar = figure.add_axes([edge / width, y_low / total, 0.09 / width, (y_high - y_low) / total])
-        colours = figure.colorbar(mapped, cax=bar, extend="both")
-        colours.outline.set_linewidth(0.4)
-        colours.ax.locator_params(nbins=max(2, min(6, int((y_high - y_low) / 0.3))))
-        colours.set_label(f"{'Error of ' if kind == 'error' else ''}"
-                          f"{components.symbol(component).split(' ')[-1] if kind == 'error' else components.symbol(component)}"
-                          f" [{unit}]")
-    notes.insert(0, _where_of_title([s for _, _, s in shown]))
-    notes.append("Colours span the 1st to 99th percentile" if "range" not in entry else "")
-    return Drawing(figure, [r for _, r, _ in shown], [n for n in dict.fromkeys(notes) if n])
-
-
-def _history_values(result, entry, exact=False):
-    """(M,) of a probe's component or of a global history; None when an exact one is not there."""
-    quantity = entry["quantity"]
-    if "probe" in entry:
-        name, part = components.split(quantity)
-        dataset = f"exact_{name}" if exact else name
-        if exact and not result.has(f"history/probes/{entry['probe']}/{dataset}"):
-            return None
-        return components.pick(result.probe(entry["probe"], dataset), name, part)
-    if exact:
-        return None
-    if quantity == "total_energy":
-        return metrics.total_energy(result)
-    if quantity.startswith("linear_momentum"):
-        p = result.history("linear_momentum")
-        return {"x": p[:, 0], "y": p[:, 1]}.get(quantity[-1]) if quantity[-2] == "_" else np.hypot(p[:, 0], p[:, 1])
-    values = result.history(quantity)
-    if values.ndim != 1:
-        raise FigureError(f"the history '{quantity}' is not one number per sample")
-    return values
-
-
-def _scale(run, scale):
-    if scale is None or scale == "initial":
-        return 1.0
-    if isinstance(scale, str):
-        reference = run.result.reference
-        if scale not in reference:
-            raise FigureError(f"{run.id} lacks report.reference.{scale}")
-        return reference[scale]
-    return float(scale)
-
-
-def history(study, entry, style):
-    notes = []
-    runs = with_result(one_size(chosen(study, entry), entry), notes, completed=False)
-    lines, exact = [], None
-    for label, own in by_series(runs, entry, style).items():
-        for run in sorted(own, key=lambda r: -(r.values.get("L") or 0)):
-            if not run.completed:
-                notes.append(f"{label} ({short('L', run.values['L'])}) {run.status}: {run.reason}".rstrip(": "))
-            time, values = run.result.history("time"), _history_values(run.result, entry)
-            sx, sy = _scale(run, entry.get("scale_x")), _scale(run, entry.get("scale_y"))
-            if entry.get("log"):
-                values = np.where(values > 0, values, np.nan)
-            keep = time <= entry.get("t_max", math.inf)
-            if entry.get("scale_y") == "initial":
-                sy = values[0]
-            lines.append((label, run, time[keep] / sx, values[keep] / sy))
-            true = _history_values(run.result, entry, True)
-            if true is not None and run.completed and (exact is None or len(time) > len(exact[0])):
-                exact = (time[keep] / sx, true[keep] / sy)
-    several = len({line[1].values["L"] for line in lines}) > 1
-    names = [f"{l}, L = {r.values['L']:g} m" if several else l for l, r, _, _ in lines]
-    if "probe" in entry:
-        name, _ = components.split(entry["quantity"])
-        title, unit = components.symbol(entry["quantity"]), components.default_unit(name)
-    else:
-        title, unit = HISTORY_NAMES.get(entry["quantity"], (entry["quantity"].replace("_", " "), ""))
-    bounded = [v for (_, r, _, v) in lines if r.completed] or [v for *_, v in lines]
-    factor = 1.0
-    if "scale_y" in entry:
-        by = entry["scale_y"]
-        title = title.split(" ")[-1] if "$" in title else title
-        by = "initial value" if by == "initial" else by
-        title, unit = f"{title} / {by.replace('_', ' ') if isinstance(by, str) else number(by)}", ""
-        largest = max(np.nanmax(np.abs(v)) for v in bounded)
-        if 0 < largest < 1e-2:  # the power of ten goes into the label: long tick labels would push it off the page
-            power = 3 * math.floor(math.log10(largest) / 3)
-            unit, factor = rf"$10^{{{power}}}$", 10.0**-power
-    else:
-        unit, factor = _axis_scale(bounded, unit)
-    width = WIDTH[entry.get("width", "column")]
-    columns, rows = legend_shape(names + (["exact"] if exact else []), width)
-    figure, axes = frame(width, 2.1, rows, left=0.62, right=0.12)
-    axis, handles = axes[0, 0], []
-    if exact:
-        axis.plot(exact[0], exact[1] * factor, **EXACT)
-    for k, ((label, run, time, values), name) in enumerate(zip(lines, names)):
-        look = style.of(label) if not several else style.of(label) | {"linestyle": ("-", "--", "-.", ":")[
-            sorted({l[1].values["L"] for l in lines}, reverse=True).index(run.values["L"]) % 4]}
-        every = max(1, len(time) // 8)
-        axis.plot(time, values * factor, **look, markevery=(k * every // max(1, len(lines)), every), markersize=3)
-        handles.append(Line2D([], [], **look, label=name, markersize=3))
-    low = min(np.nanmin(np.where(np.isfinite(v), v, np.nan)) for v in bounded) * factor
-    high = max(np.nanmax(np.where(np.isfinite(v), v, np.nan)) for v in bounded) * factor
-    if exact:
-        low, high = min(low, exact[1].min() * factor), max(high, exact[1].max() * factor)
-    if entry.get("log"):
-        axis.set_yscale("log")
-        positive = np.concatenate([v[v > 0] for v in bounded if (v > 0).any()] or [[1.0]]) * factor
-        axis.set_ylim(max(positive.min(), positive.max() * 1e-12) / 2, positive.max() * 2)
-    else:
-        pad = 0.06 * (high - low) or 1.0
-        axis.set_ylim(low - pad, high + pad)
-    axis.set_xlim(0, max(t[-1] for _, _, t, _ in lines if len(t)))
-    scale = entry.get("scale_x")
-    axis.set_xlabel("Time $t$ [s]" if scale is None else
-                    f"Time / {scale.replace('_', ' ') if isinstance(scale, str) else number(scale)}")
-    axis.set_ylabel(f"{title} [{unit}]" if unit else title)
-    if exact:
-        handles.append(Line2D([], [], **EXACT))
-    legend_below(figure, handles, columns)
-    return Drawing(figure, runs, list(dict.fromkeys(notes)))
-
 
 def bars(study, entry, style):
     quantity, norm = entry["quantity"], entry.get("norm", "")
@@ -745,7 +376,7 @@ def bars(study, entry, style):
 
 
 KINDS = {"convergence": convergence, "work_precision": work_precision, "profile": profile, "field": field_maps,
-         "history": history, "bars": bars}
+         "history": history, "curve": curve, "bars": bars}
 
 
 def draw(study, entry, style):

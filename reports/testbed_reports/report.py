@@ -91,7 +91,8 @@ def _figure_labels(studies):
 def _study_section(study, style, out, command, failures):
     figures, used = [], Counter()
     for entry in study.spec.figures:
-        what = entry.get("quantity") or entry.get("component", "")
+        what = (entry.get("quantity") or entry.get("component") or " ".join(filter(None, (entry.get("y"), entry.get("x"))))
+                or "deformed_grid")
         name = slug(entry.get("name") or "_".join(filter(None, (entry["kind"], what, entry.get("norm", "")))))
         used[name] += 1
         name = f"{slug(study.name)}_{name}" + (f"_{used[name]}" if used[name] > 1 else "")

@@ -83,6 +83,7 @@ class Result:
                 self.phases = _attributes(file["performance/phases"]) if "performance/phases" in file else {}
                 self.materials = {name: _attributes(node) for name, node in file.get("materials", {}).items()}
                 self.probes = sorted(file["history/probes"]) if "history/probes" in file else []
+                self.supports = sorted(file["history/supports"]) if "history/supports" in file else []
                 self.histories = [name for name, node in file.get("history", {}).items()
                                   if isinstance(node, h5py.Dataset)]
                 self.snapshots = [Snapshot(self, name, _attributes(node), set(node))
@@ -132,9 +133,24 @@ class Result:
         return numbers
 
     @property
+    def curves(self):
+        """Reference curves of the scene's [[report.curve]]: name -> (x (K,), y (K,)), SI units."""
+        found = {}
+        for table in self.resolved.get("report", {}).get("curve", []):
+            name = table.get("name", "")
+            try:
+                x, y = (np.array(table[key], dtype=float) for key in ("x", "y"))
+            except (KeyError, TypeError, ValueError):
+                raise ResultError(f"{self.path}: [[report.curve]] '{name}' needs lists of numbers x and y") from None
+            if x.ndim != 1 or x.shape != y.shape or len(x) < 2:
+                raise ResultError(f"{self.path}: [[report.curve]] '{name}' needs x and y of one length, at least 2")
+            found[name] = (x, y)
+        return found
+
+    @property
     def seed(self):
         """The scene's random seed, '' when it has none."""
-        return _find(self.resolved, "seed")
+        return seed_of(self.resolved)
 
     def dataset(self, name):
         """A dataset as a float array."""
@@ -164,6 +180,10 @@ class Result:
         """A history of a probe: (M, 3) or (M, 6)."""
         return self.dataset(f"history/probes/{probe}/{name}")
 
+    def support(self, support, name):
+        """A history of a support: `reaction` on the soil or `displacement`, (M, 3)."""
+        return self.dataset(f"history/supports/{support}/{name}")
+
     def has(self, name):
         with h5py.File(self.path, "r") as file:
             return name in file
@@ -173,6 +193,12 @@ class Result:
         if not self.snapshots:
             raise ResultError(f"{self.path}: lacks snapshots")
         return self.snapshots[-1]
+
+
+def seed_of(resolved):
+    """The seed of a resolved scene: that of the first material with a random strength, else any; '' when there is none."""
+    materials = [m["random"] for m in resolved.get("material", []) if isinstance(m.get("random"), dict)]
+    return _find(materials, "seed") if _find(materials, "seed") != "" else _find(resolved, "seed")
 
 
 def _find(table, key):

@@ -15,7 +15,7 @@ import tomllib
 from pathlib import Path
 
 from .dataset import PLAN, metrics_csv, read_study_folder, write_atomically
-from .results import is_finished
+from .results import is_finished, seed_of
 from .runner import Task, run_all
 from .study_file import StudyError, read_study, toml_value
 from .targets import as_text, judge_all
@@ -151,7 +151,7 @@ def expand(study, testbed, folder, keep, jobs):
                     run_id = max(old, key=lambda p: p.stat().st_mtime).name
             entries.append({"id": run_id, "case": case_of(combination), "method": family(method), "variant": method,
                             "L": resolved.get("grid", {}).get("cell_size"), "ppc": points_per_cell(resolved),
-                            "axes": combination.axes, "repeat": repeat, "outcome": ""})
+                            "seed": seed_of(resolved), "axes": combination.axes, "repeat": repeat, "outcome": ""})
             out = runs / run_id
             if not is_finished(out / "result.h5"):
                 command = [str(testbed), "run", *run_arguments(combination), "--threads", str(combination.threads),

@@ -12,7 +12,7 @@ from .spelling import did_you_mean
 
 NUMBER, TEXT, LIST, TABLE, FLAG = (int, float), (str,), (list,), (dict,), (bool,)
 TYPE_NAMES = {NUMBER: "a number", TEXT: "a string", LIST: "a list", TABLE: "a table", FLAG: "true or false",
-              (int,): "a whole number", TEXT + LIST: "a string or a list of strings",
+              (int,): "a whole number", (int,) + LIST: "a whole number or a list of such", TEXT + LIST: "a string or a list of strings",
               NUMBER + LIST: "a number or a list of numbers", TEXT + NUMBER: "a string or a number"}
 
 STUDY_KEYS = {"title": TEXT, "purpose": TEXT, "scene": TEXT, "repeats": (int,), "threads": (int,), "set": TABLE,
@@ -35,12 +35,18 @@ FIGURE_KINDS = {
     "work_precision": ({"quantity": TEXT}, {"norm": TEXT}),
     "profile": ({"component": TEXT}, {"along": TEXT, "panels": TEXT, "L": NUMBER + LIST, "band": LIST,
                                       "snapshot": (int,)}),
-    "field": ({"component": TEXT}, {"L": NUMBER, "range": LIST, "error": FLAG, "columns": (int,), "snapshot": (int,)}),
-    "history": ({"quantity": TEXT}, {"probe": TEXT, "L": NUMBER + LIST, "scale_x": TEXT + NUMBER,
+    "field": ({}, {"component": TEXT, "L": NUMBER, "range": LIST, "error": FLAG, "columns": (int,), "snapshot": (int,) + LIST,
+                   "inclusions": FLAG, "deformed_grid": FLAG, "pattern": TEXT, "spacing": NUMBER}),
+    "curve": ({"x": TEXT, "y": TEXT}, {f"{key}{side}": kind for side in ("x", "y") for key, kind in (
+        ("offset_", TEXT + NUMBER), ("scale_", TEXT + NUMBER))} | {
+        f"{side}_{key}": TEXT for side in ("x", "y") for key in ("support", "probe", "label", "unit")} | {
+        "L": NUMBER + LIST, "levels": LIST}),
+    "history": ({"quantity": TEXT}, {"probe": TEXT, "support": TEXT, "L": NUMBER + LIST, "scale_x": TEXT + NUMBER,
                                      "scale_y": TEXT + NUMBER, "log": FLAG, "t_max": NUMBER}),
     "bars": ({"quantity": TEXT}, {"norm": TEXT, "L": NUMBER, "log": FLAG}),
 }
 WIDTHS = ("column", "page")
+PATTERNS = ("checker", "strata")
 
 
 class StudyError(Exception):
@@ -275,6 +281,31 @@ def read_study(path, need_scene=True):
                      key, table, index)
         return where
 
+    def check_list(entry, key, kinds, words, index):
+        values = entry[key] if isinstance(entry.get(key), list) else []
+        if any(not isinstance(v, kinds) or isinstance(v, bool) for v in values) or entry.get(key) == []:
+            fail(f"'{key}' in [[figure]] number {index + 1} must hold {words}", key, "figure", index)
+
+    def check_figure(entry, index):
+        """What one key asks of another."""
+        check_list(entry, "snapshot", int, "whole numbers", index)
+        check_list(entry, "levels", TEXT + NUMBER, "numbers or names of report.reference", index)
+        if entry["kind"] == "field":
+            if ("component" in entry) == entry.get("deformed_grid", False):
+                fail(f"[[figure]] number {index + 1} needs either the key 'component' or 'deformed_grid = true'",
+                     "kind", "figure", index)
+            for key in {"pattern", "spacing"} & set(entry) if "component" in entry else ():
+                fail(f"'{key}' in [[figure]] number {index + 1} means nothing without 'deformed_grid = true'", key, "figure", index)
+            reader.choice(entry.get("pattern", PATTERNS[0]), PATTERNS, "pattern", "figure", index)
+            if entry.get("spacing", 1) <= 0:
+                fail(f"'spacing' in [[figure]] number {index + 1} must be positive", "spacing", "figure", index)
+        for side in ("x", "y"):
+            if f"{side}_support" in entry and f"{side}_probe" in entry:
+                fail(f"[[figure]] number {index + 1} takes '{side}' from a support or a probe, not both", f"{side}_probe",
+                     "figure", index)
+        if "support" in entry and "probe" in entry:
+            fail(f"[[figure]] number {index + 1} takes its quantity from a support or a probe, not both", "probe", "figure", index)
+
     targets, figures = [], []
     for index, entry in reader.tables("target"):
         reader.check(entry, TARGET_KEYS, "target", index)
@@ -296,6 +327,7 @@ def read_study(path, need_scene=True):
         reader.need(entry, needed, "figure", index, f"the kind '{entry['kind']}'")
         if "width" in entry:
             reader.choice(entry["width"], WIDTHS, "width", "figure", index)
+        check_figure(entry, index)
         series = entry.get("series", ["variant"])
         series = [series] if isinstance(series, str) else series
         for key in series:

@@ -103,6 +103,7 @@ def nice_unit(unit, largest):
     """(unit, factor) in which a value of SI `unit` reads well."""
     steps = {"Pa": (("GPa", 1e-9, 1e10), ("MPa", 1e-6, 1e7), ("kPa", 1e-3, 1e3)),
              "m": (("m", 1.0, 0.5), ("mm", 1e3, 1e-3), ("µm", 1e6, 1e-6)),
+             "N/m": (("MN/m", 1e-6, 1e7), ("kN/m", 1e-3, 1e3)), "rad": (("°", 180.0 / math.pi, 0.0),),
              "J/m": (("MJ/m", 1e-6, 1e7), ("kJ/m", 1e-3, 1e4)),
              "m/s": (("m/s", 1.0, 0.1), ("mm/s", 1e3, 1e-4))}
     for name, factor, least in steps.get(unit, ()):

@@ -158,6 +158,18 @@ def test_reference_must_be_numbers(make):
 def test_seed_and_settings_are_read(make):
     assert make(seed=7).seed == 7 and make("b.h5").seed == ""
     assert make("c.h5").reference["static_displacement"] == TIP
+    random = '[[material]]\nname = "soil"\n[material.random]\nseed = 3\n'
+    assert make("d.h5", scene_extra=random).seed == 3
+    assert make("e.h5", scene_extra="[other]\nseed = 1\n" + random).seed == 3  # that of the strength goes first
+
+
+def test_reference_curves_are_read(make):
+    x, y = make(scene_extra='[[report.curve]]\nname = "surface"\nx = [0, 1.5]\ny = [2.0, 0]\n').curves["surface"]
+    assert x.tolist() == [0.0, 1.5] and y.tolist() == [2.0, 0.0]
+    with pytest.raises(ResultError, match="'surface' needs x and y of one length"):
+        make("b.h5", scene_extra='[[report.curve]]\nname = "surface"\nx = [0, 1.5]\ny = [2.0]\n').curves
+    with pytest.raises(ResultError, match="'surface' needs lists of numbers"):
+        make("c.h5", scene_extra='[[report.curve]]\nname = "surface"\nx = [0, 1]\ny = ["a", 1]\n').curves
 
 
 @pytest.mark.parametrize("harm, told", [

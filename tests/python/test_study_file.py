@@ -90,3 +90,31 @@ def test_exit_code_of_a_broken_file(tmp_path):
     assert done.returncode == 1 and "'repeat'" in done.stderr and "s.toml:3" in done.stderr and "Traceback" not in done.stderr
     assert subprocess.run([REPORTS / "testbed-study"], capture_output=True).returncode == 1
     assert subprocess.run([REPORTS / "testbed-study", "-j", "0", "x"], capture_output=True).returncode == 1
+
+
+FIELD, CURVE = '[[figure]]\nkind = "field"\n', '[[figure]]\nkind = "curve"\n'
+
+
+@pytest.mark.parametrize("text, told", [
+    (FIELD, "s.toml:4: .*either the key 'component' or 'deformed_grid = true'"),
+    (FIELD + 'component = "stress_yy"\ndeformed_grid = true\n', "either the key 'component'"),
+    (FIELD + 'component = "stress_yy"\npattern = "strata"\n', "s.toml:6: 'pattern'.*without 'deformed_grid = true'"),
+    (FIELD + 'deformed_grid = true\npattern = "strat"\n', "unknown pattern 'strat'.*did you mean 'strata'"),
+    (FIELD + "deformed_grid = true\nspacing = 0\n", "s.toml:6: 'spacing'.*positive"),
+    (FIELD + "deformed_grid = true\nsnapshot = [0, 1.5]\n", "s.toml:6: 'snapshot'.*whole numbers"),
+    (FIELD + "deformed_grid = true\nsnapshot = []\n", "'snapshot'.*whole numbers"),
+    (CURVE + 'x = "time"\n', "lacks the key 'y'"),
+    (CURVE + 'x = "time"\ny = "reaction_y"\ny_support = "a"\ny_probe = "b"\n', "s.toml:8: .*'y' from a support or a probe"),
+    (CURVE + 'x = "time"\ny = "max_stress"\nlevels = [true]\n', "s.toml:7: 'levels'.*numbers or names"),
+    (CURVE + 'x = "time"\ny = "max_stress"\nscale = 1\n', "s.toml:7: unknown key 'scale'"),
+    ('[[figure]]\nkind = "history"\nquantity = "reaction_y"\nsupport = "a"\nprobe = "b"\n', "from a support or a probe")])
+def test_broken_figures_name_line_and_key(read, text, told):
+    with pytest.raises(StudyError, match=told):
+        read(BASE + text)
+
+
+def test_figures_of_soil_tests(read):
+    study = read(BASE + FIELD + 'deformed_grid = true\npattern = "strata"\nspacing = 0.1\nsnapshot = [0, -1]\n'
+                 + CURVE + 'x = "displacement_y"\nx_support = "cap"\nscale_x = "-height"\ny = "reaction_y"\ny_support = "base"\n'
+                 'scale_y = 1.0\ny_unit = "Pa"\nlevels = [1, "peak_stress"]\n')
+    assert [f["kind"] for f in study.figures] == ["field", "curve"]
