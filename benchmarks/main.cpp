@@ -97,7 +97,7 @@ void check(const RunOptions& options, bool resolved)
                std::ceil(scene.time.end / time_step(scene)));
     std::size_t points = 0;
     for (const BodySpec& body : scene.bodies)
-        points += fill(body, scene.grid).size();
+        points += fill(scene, body).size();
     fmt::print("points           {}\n", points);
     if (is_fem)
     {

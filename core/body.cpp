@@ -1,6 +1,8 @@
 #include "core/body.hpp"
 
 #include "core/geometry.hpp"
+#include "core/make_material.hpp"
+#include "core/random_field.hpp"
 
 #include <cmath>
 #include <fmt/format.h>
@@ -9,21 +11,83 @@ namespace testbed
 {
 namespace
 {
-template <class Law>
-Material with_stiffness(const ElasticModuli& moduli, bool varies)
+/// Parameters of a material at its points; one value if it is the same everywhere.
+struct PointParameters
 {
-    if (varies)
-        return VaryingStiffness<Law>{{moduli}};
-    return Law{moduli};
+    std::vector<double> stiffness, cohesion, friction;
+    double truncated_share = 0;
+
+    Varying varying() const { return {stiffness.size() > 1, cohesion.size() > 1}; }
+};
+
+class ParameterReader
+{
+public:
+    ParameterReader(const Scene& scene, const MaterialSpec& material) : scene_(scene), material_(material) {}
+
+    /// Values of a parameter at the points, one if the text is a number. @throws SceneError where it is not valid
+    std::vector<double> read(const char* key, const std::string& text, const std::vector<Vec2>& positions, bool everywhere, auto&& is_valid,
+                             const char* rule) const
+    {
+        const Expression expression(text, scene_.expression_constants());
+        std::vector<double> values(everywhere || !is_number(text) ? positions.size() : 1);
+        for (std::size_t p = 0; p < values.size(); ++p)
+        {
+            const Vec2& X = positions[p];
+            values[p] = expression({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
+            if (!std::isfinite(values[p]) || !is_valid(values[p]))
+                throw SceneError(fmt::format("{}: material '{}': {} = {} at ({}, {}) m, {}", scene_.path, material_.name, key, values[p],
+                                             X[0], X[1], rule));
+        }
+        return values;
+    }
+
+private:
+    const Scene& scene_;
+    const MaterialSpec& material_;
+};
+
+PointParameters read_parameters(const Scene& scene, const MaterialSpec& material, const std::vector<Vec2>& positions,
+                                std::uint32_t first_id)
+{
+    const ParameterReader reader(scene, material);
+    PointParameters out;
+    out.stiffness = reader.read(
+        "youngs_modulus", material.youngs_modulus, positions, false, [](double v) { return v > 0; }, "must be positive");
+    if (!material.has_strength())
+        return out;
+    const StrengthSpec& strength = *material.strength;
+    const bool varies = material.random || !is_number(strength.cohesion) || !is_number(strength.friction_angle);
+    out.cohesion = reader.read(
+        "strength.cohesion", strength.cohesion, positions, varies, [](double v) { return v >= 0; }, "must not be negative");
+    out.friction = reader.read(
+        "strength.friction_angle", strength.friction_angle, positions, varies,
+        [&](double v) { return v >= strength.dilatancy_angle && v < 0.5 * std::numbers::pi; },
+        "must lie between the dilatancy angle and pi/2 (radians)");
+    if (material.random)
+    {
+        RandomStrength random(*material.random);
+        for (std::size_t p = 0; p < positions.size(); ++p)
+            random.draw(positions[p], first_id + static_cast<std::uint32_t>(p), out.cohesion[p], out.friction[p]);
+        out.truncated_share = random.truncated_share();
+    }
+    return out;
 }
 
-Material make_material(const MaterialSpec& spec, const ElasticModuli& moduli, bool varies)
+void set_initial_stress(const std::array<std::string, 4>& text, const Constants& constants, Points& q)
 {
-    if (spec.law == "linear_elastic")
-        return with_stiffness<LinearElastic>(moduli, varies);
-    if (spec.law == "hypoelastic_jaumann")
-        return with_stiffness<HypoelasticJaumann>(moduli, varies);
-    return with_stiffness<HypoelasticExactRotation>(moduli, varies);
+    std::vector<Expression> stress;
+    for (const std::string& component : text)
+        stress.emplace_back(component, constants);
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        const Place here{.X = q.x[p], .Y = q.y[p], .x = q.x[p], .y = q.y[p]};
+        q.sxx[p] = stress[0].finite(here);
+        q.syy[p] = stress[1].finite(here);
+        if (q.szz.active())
+            q.szz[p] = stress[2].finite(here);
+        q.sxy[p] = stress[3].finite(here);
+    }
 }
 }  // namespace
 
@@ -40,26 +104,23 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
     std::uint32_t next_id = 0;
     for (const BodySpec& spec : scene.bodies)
     {
-        const std::vector<Vec2> positions = fill(spec, scene.grid);
+        const std::vector<Vec2> positions = fill(scene, spec);
         if (positions.empty())
             throw SceneError(
                 fmt::format("{}: body '{}' has no points; it is smaller than the spacing of its points", scene.path, spec.name));
         const MaterialSpec& material = scene.material(spec.material);
-        const Expression modulus(material.youngs_modulus, constants);
-        const bool varies = !is_number(material.youngs_modulus);
         const std::size_t n = positions.size();
-        std::vector<double> stiffness(varies ? n : 1);
-        double largest = 0;
-        for (std::size_t p = 0; p < stiffness.size(); ++p)
-        {
-            const Vec2& X = positions[p];
-            stiffness[p] = modulus({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
-            if (!(stiffness[p] > 0) || !std::isfinite(stiffness[p]))
-                throw SceneError(fmt::format("{}: material '{}': youngs_modulus = {} at ({}, {}) m, must be positive", scene.path,
-                                             material.name, stiffness[p], X[0], X[1]));
-            largest = std::max(largest, stiffness[p]);
-        }
-        bodies.push_back({spec.name, {}, make_material(material, {largest, material.poissons_ratio}, varies), Bins(lattice)});
+        const PointParameters parameters = read_parameters(scene, material, positions, next_id);
+        const Varying varying = parameters.varying();
+        const double largest = *std::max_element(parameters.stiffness.begin(), parameters.stiffness.end());
+        const Strength<> strength = material.has_strength() && !varying.strength
+                                        ? Strength<>{parameters.cohesion[0], std::sin(parameters.friction[0])}
+                                        : Strength<>{0, 0};
+        bodies.push_back({spec.name,
+                          {},
+                          make_material(material, {largest, material.poissons_ratio}, strength, scene.grid.cell_size, varying),
+                          Bins(lattice),
+                          parameters.truncated_share});
 
         Points& q = bodies.back().points;
         const double h = spacing(spec, scene.grid);
@@ -86,8 +147,7 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
             q.vx.activate(n);
             q.vy.activate(n);
         }
-        if (varies)
-            q.stiffness.activate(n);
+        std::visit([&](const auto& law) { law.allocate(q); }, bodies.back().material);
         std::optional<VectorExpression> velocity;
         if (needs.velocity && spec.velocity)
             velocity.emplace(*spec.velocity, constants);
@@ -102,8 +162,13 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
                 q.Y[p] = X[1];
             }
             q.id[p] = next_id++;
-            if (varies)
-                q.stiffness[p] = stiffness[p] / largest;
+            if (varying.stiffness)
+                q.stiffness[p] = parameters.stiffness[p] / largest;
+            if (varying.strength)
+            {
+                q.cohesion[p] = parameters.cohesion[p];
+                q.sin_friction[p] = std::sin(parameters.friction[p]);
+            }
             if (velocity)
             {
                 const Vec2 v = (*velocity)({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
@@ -111,6 +176,8 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
                 q.vy[p] = v[1];
             }
         }
+        if (spec.initial_stress)
+            set_initial_stress(*spec.initial_stress, constants, q);
     }
     return bodies;
 }

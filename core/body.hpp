@@ -13,6 +13,7 @@ struct Body
     Points points;
     Material material;
     Bins bins;
+    double truncated_share = 0;  ///< of the random strengths drawn
 };
 
 /// What a method asks of each point beyond position and stress.

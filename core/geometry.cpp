@@ -1,7 +1,9 @@
 #include "core/geometry.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 
 namespace testbed
 {
@@ -15,9 +17,9 @@ bool inside_polygon(const std::vector<Vec2>& v, const Vec2& p)
             inside = !inside;
     return inside;
 }
-}  // namespace
 
-std::vector<Vec2> fill(const BodySpec& body, const GridSpec& grid)
+/// Centres of the squares of a body's pattern, whether in its shape or not.
+std::vector<Vec2> pattern(const BodySpec& body, const GridSpec& grid)
 {
     const double h = spacing(body, grid);
     Vec2 corner = grid.origin, extent = grid.size;
@@ -26,20 +28,55 @@ std::vector<Vec2> fill(const BodySpec& body, const GridSpec& grid)
         corner = *body.min;
         extent = {(*body.max)[0] - corner[0], (*body.max)[1] - corner[1]};
     }
-    const auto inside = [&](const Vec2& p)
-    {
-        if (body.shape == "disk")
-            return std::hypot(p[0] - (*body.center)[0], p[1] - (*body.center)[1]) <= *body.radius;
-        if (body.shape == "polygon")
-            return inside_polygon(body.vertices, p);
-        return true;
-    };
     const auto columns = std::llround(extent[0] / h), rows = std::llround(extent[1] / h);
     std::vector<Vec2> points;
     for (long long j = 0; j < rows; ++j)
         for (long long i = 0; i < columns; ++i)
-            if (const Vec2 p{corner[0] + (static_cast<double>(i) + 0.5) * h, corner[1] + (static_cast<double>(j) + 0.5) * h}; inside(p))
-                points.push_back(p);
+            points.push_back({corner[0] + (static_cast<double>(i) + 0.5) * h, corner[1] + (static_cast<double>(j) + 0.5) * h});
+    return points;
+}
+}  // namespace
+
+bool contains(const BodySpec& body, const Vec2& p, double slack)
+{
+    if (body.shape == "disk")
+        return std::hypot(p[0] - (*body.center)[0], p[1] - (*body.center)[1]) <= *body.radius + slack;
+    if (body.shape == "polygon")
+        return inside_polygon(body.vertices, p);
+    return p[0] >= (*body.min)[0] - slack && p[0] <= (*body.max)[0] + slack && p[1] >= (*body.min)[1] - slack &&
+           p[1] <= (*body.max)[1] + slack;
+}
+
+std::vector<Vec2> outline(const BodySpec& body)
+{
+    if (body.shape == "polygon")
+        return body.vertices;
+    if (body.shape == "box")
+        return {*body.min, {(*body.max)[0], (*body.min)[1]}, *body.max, {(*body.min)[0], (*body.max)[1]}};
+    std::vector<Vec2> circle;
+    for (int k = 0; k < 64; ++k)
+    {
+        const double angle = 2 * std::numbers::pi * k / 64;
+        circle.push_back({(*body.center)[0] + *body.radius * std::cos(angle), (*body.center)[1] + *body.radius * std::sin(angle)});
+    }
+    return circle;
+}
+
+std::vector<Vec2> fill(const Scene& scene, const BodySpec& body)
+{
+    const bool is_inclusion = !body.inside.empty();
+    const BodySpec& host = is_inclusion ? scene.body(body.inside) : body;
+    std::vector<const BodySpec*> inclusions;
+    for (const BodySpec& other : scene.bodies)
+        if (other.inside == host.name && !is_inclusion)
+            inclusions.push_back(&other);
+    std::vector<Vec2> points = pattern(host, scene.grid);
+    std::erase_if(points,
+                  [&](const Vec2& p)
+                  {
+                      const auto in = [&](const BodySpec* inclusion) { return contains(*inclusion, p); };
+                      return !contains(host, p) || !contains(body, p) || std::any_of(inclusions.begin(), inclusions.end(), in);
+                  });
     return points;
 }
 

@@ -5,9 +5,16 @@
 
 namespace testbed
 {
+/// Whether a place lies in the body's shape, or within `slack` of a box or disk [m].
+bool contains(const BodySpec& body, const Vec2& place, double slack = 0);
+
+/// Places on the outline of a body's shape: its corners, or points around a disk.
+std::vector<Vec2> outline(const BodySpec& body);
+
 /// Initial positions of a body's points, in order [m]: squares of side L / points_per_cell whose centre lies in the body.
-/// A box starts its pattern at its own corner, other shapes at the lattice.
-std::vector<Vec2> fill(const BodySpec& body, const GridSpec& grid);
+/// A box starts its pattern at its own corner, other shapes at the lattice; an inclusion has the pattern of the body it lies in,
+/// which goes without those points.
+std::vector<Vec2> fill(const Scene& scene, const BodySpec& body);
 
 /// Side of the square that one point stands for [m].
 inline double spacing(const BodySpec& body, const GridSpec& grid)

@@ -22,7 +22,7 @@ std::vector<Vec2> initial_positions(const Scene& scene)
     std::vector<Vec2> all;
     for (const BodySpec& body : scene.bodies)
     {
-        const std::vector<Vec2> part = fill(body, scene.grid);
+        const std::vector<Vec2> part = fill(scene, body);
         all.insert(all.end(), part.begin(), part.end());
     }
     return all;
@@ -35,13 +35,15 @@ PointSums point_sums(const std::vector<Body>& bodies)
     {
         const Points& q = body.points;
         const ElasticModuli base = moduli(body.material);
-        const auto s = ordered_sum<3>(q.count,
-                                      [&](std::size_t p)
-                                      {
-                                          const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
-                                          const double energy = elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}) / softer;
-                                          return std::array<double, 3>{energy * q.current_volume(p), q.mass * q.x[p], q.mass * q.y[p]};
-                                      });
+        const auto s =
+            ordered_sum<3>(q.count,
+                           [&](std::size_t p)
+                           {
+                               const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
+                               const double energy =
+                                   elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}, out_of_plane_stress(base, q, p)) / softer;
+                               return std::array<double, 3>{energy * q.current_volume(p), q.mass * q.x[p], q.mass * q.y[p]};
+                           });
         total.strain_energy += s[0];
         total.moment[0] += s[1];
         total.moment[1] += s[2];
@@ -125,8 +127,7 @@ std::array<double, 6> Observer::stress(const Location& at) const
 {
     const Body& body = solver_.bodies()[at.body];
     const Points& q = body.points;
-    const double xx = q.sxx[at.point], yy = q.syy[at.point];
-    return {xx, q.sxy[at.point], 0, yy, 0, moduli(body.material).poissons_ratio() * (xx + yy)};
+    return {q.sxx[at.point], q.sxy[at.point], 0, q.syy[at.point], 0, out_of_plane_stress(moduli(body.material), q, at.point)};
 }
 
 std::array<double, 6> Observer::exact_stress(const Place& at) const

@@ -66,6 +66,11 @@ const MaterialSpec& Scene::material(const std::string& name) const
     return *std::find_if(materials.begin(), materials.end(), [&](const auto& m) { return m.name == name; });
 }
 
+const BodySpec& Scene::body(const std::string& name) const
+{
+    return *std::find_if(bodies.begin(), bodies.end(), [&](const auto& b) { return b.name == name; });
+}
+
 Constants Scene::expression_constants() const
 {
     Constants all = constants;
@@ -155,6 +160,9 @@ LoadedScene load_scene(const std::string& path, const std::string& method, const
     throw_if_any();
     check_scene(scene, problems);
     throw_if_any();
+    for (BodySpec& body : scene.bodies)
+        if (!body.inside.empty())
+            body.points_per_cell = scene.body(body.inside).points_per_cell;
     check_limits(scene, problems);
     throw_if_any();
     loaded.warnings = problems.warnings();

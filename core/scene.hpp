@@ -3,6 +3,7 @@
 /// `testbed doc` and the writer of the resolved scene.
 
 #include "core/expression.hpp"
+#include "core/material_spec.hpp"
 #include "core/types.hpp"
 
 #include <filesystem>
@@ -51,12 +52,14 @@ struct GravitySpec
 {
     Vec2 acceleration{0, 0};
     double ramp = 0;
+    std::string profile = "smooth";
 
     template <class V>
     void describe(V& v)
     {
         v.required("acceleration", acceleration, "m/s^2", "full value");
-        v.optional("ramp", ramp, "s", "time over which it grows smoothly from zero; 0 applies it at once");
+        v.optional("ramp", ramp, "s", "time over which it grows from zero; 0 applies it at once");
+        v.choice("profile", profile, {"smooth", "linear"}, "of the ramp: (1 - cos)/2, or linear for loading to failure");
     }
 };
 
@@ -71,37 +74,15 @@ struct DampingSpec
     }
 };
 
-struct MaterialSpec
-{
-    std::string name, law;
-    double density = 0, poissons_ratio = 0;
-    std::string youngs_modulus;  ///< number or expression of X, Y
-
-    static const std::vector<std::string>& laws()
-    {
-        static const std::vector<std::string> names{"linear_elastic", "hypoelastic_jaumann", "hypoelastic_exact_rotation"};
-        return names;
-    }
-
-    template <class V>
-    void describe(V& v)
-    {
-        v.required("name", name, "", "referred to by bodies");
-        v.choice("law", law, laws(), "plane-strain law");
-        v.required("density", density, "kg/m^3", "initial density");
-        v.expression("youngs_modulus", youngs_modulus, "Pa", "number, or expression of the initial position X, Y");
-        v.required("poissons_ratio", poissons_ratio, "-", "in (-1, 1/2)");
-    }
-};
-
 struct BodySpec
 {
-    std::string name, material, shape;
+    std::string name, material, shape, inside;
     int points_per_cell = 4;
     std::optional<Vec2> min, max, center;
     std::optional<double> radius;
     std::vector<Vec2> vertices;
     std::optional<Expr2> velocity;
+    std::optional<std::array<std::string, 4>> initial_stress;
 
     template <class V>
     void describe(V& v)
@@ -115,7 +96,9 @@ struct BodySpec
         v.optional("center", center, "m", "disk");
         v.optional("radius", radius, "m", "disk");
         v.optional("vertices", vertices, "m", "polygon: corners in order");
+        v.optional("inside", inside, "", "an inclusion: takes those points of this other body that lie in its shape, and their size");
         v.optional("velocity", velocity, "m/s", "initial velocity, two expressions of X, Y");
+        v.optional("initial_stress", initial_stress, "Pa", "four expressions of X, Y: xx, yy, zz, xy; such as K0 stress under gravity");
     }
 };
 
@@ -129,6 +112,46 @@ struct BoundarySpec
         v.required("name", name, "", "name of the boundary");
         v.expression("where", where, "", "condition on node positions x, y, such as \"y <= 0\"");
         v.choice("fix", fix, {"x", "y", "xy"}, "velocity components held at zero; one component makes a roller");
+    }
+};
+
+/// A rigid block (or plate, if min and max agree in one coordinate) that holds or drives the nodes it covers.
+struct WallSpec
+{
+    std::string name, fix = "xy", motion = "hand_off";
+    Vec2 min{0, 0}, max{0, 0};
+    std::optional<Expr2> velocity;
+    std::optional<Vec2> door;
+    double door_opens = 0;
+
+    template <class V>
+    void describe(V& v)
+    {
+        v.required("name", name, "", "name of the wall; its reaction and displacement go into the history");
+        v.required("min", min, "m", "lower left corner at the start");
+        v.required("max", max, "m", "upper right corner; equal to min in one coordinate makes a plate");
+        v.optional("velocity", velocity, "m/s", "two expressions of t; absent: an obstacle");
+        v.choice("fix", fix, {"x", "y", "xy"}, "velocity components that soil at the wall shares; xy is rough, one is smooth");
+        v.choice("motion", motion, {"hand_off", "smooth"},
+                 "hand_off: after each cell of travel the next line of nodes is driven, as published; smooth: the velocity interpolated "
+                 "at the wall's face is driven");
+        v.optional("door", door, "m", "plate: an opening from .. to along the plate");
+        v.optional("door_opens", door_opens, "s", "time at which the door opens");
+    }
+};
+
+struct TractionSpec
+{
+    std::string name, body, face;
+    Expr2 traction{"0", "0"};
+
+    template <class V>
+    void describe(V& v)
+    {
+        v.required("name", name, "", "name of the traction");
+        v.required("body", body, "", "name of a box");
+        v.choice("face", face, {"left", "right", "bottom", "top"}, "of the box; its outermost row of points carries the load");
+        v.required("traction", traction, "Pa", "two expressions of X, Y, t: force per area of the initial face");
     }
 };
 
@@ -182,16 +205,34 @@ struct OutputSpec
     }
 };
 
+/// A measured or published curve that the report compares with.
+struct CurveSpec
+{
+    std::string name, source;
+    std::vector<double> x, y;
+
+    template <class V>
+    void describe(V& v)
+    {
+        v.required("name", name, "", "what the metrics call it");
+        v.optional("source", source, "", "citation");
+        v.required("x", x, "", "abscissae");
+        v.required("y", y, "", "ordinates");
+    }
+};
+
 struct ReportSpec
 {
     std::vector<std::string> metrics;
     Constants reference;
+    std::vector<CurveSpec> curves;
 
     template <class V>
     void describe(V& v)
     {
         v.optional("metrics", metrics, "", "groups of quantities that the report package computes from the result");
         v.named_numbers("reference", reference, "numbers that these metrics scale with");
+        v.list("curve", curves, "curves that they compare with");
     }
 };
 
@@ -253,6 +294,8 @@ struct Scene
     std::vector<MaterialSpec> materials;
     std::vector<BodySpec> bodies;
     std::vector<BoundarySpec> boundaries;
+    std::vector<WallSpec> walls;
+    std::vector<TractionSpec> tractions;
     std::optional<BodyForceSpec> body_force;
     std::vector<ProbeSpec> probes;
     std::map<std::string, ExactSpec> exact;  ///< by kinematics
@@ -278,6 +321,8 @@ struct Scene
         v.list("material", materials, "constitutive laws");
         v.list("body", bodies, "clusters of material points");
         v.list("boundary", boundaries, "fixities and rollers");
+        v.list("wall", walls, "rigid walls, moving or not");
+        v.list("traction", tractions, "loads on faces");
         v.table("body_force", body_force, "acceleration field, for manufactured solutions");
         v.list("probe", probes, "means over chosen points in the history");
         v.tables("exact", exact, {"small_strain", "hypoelastic"}, "exact solution for methods that integrate this law");
@@ -291,6 +336,7 @@ struct Scene
     /// Name of the folder that holds the scene.
     std::string case_name() const { return std::filesystem::absolute(path).lexically_normal().parent_path().filename().string(); }
     const MaterialSpec& material(const std::string& name) const;
+    const BodySpec& body(const std::string& name) const;
     /// Constants with L, as expressions see them.
     Constants expression_constants() const;
 };

@@ -16,6 +16,7 @@ struct AllLanes
     static Pack load(const double* from) { return Pack(from, stdx::element_aligned); }
     static void store(double* to, Pack v) { v.copy_to(to, stdx::element_aligned); }
     static Pack keep(Pack v) { return v; }
+    static Pack::mask_type keep(Pack::mask_type m) { return m; }
     static bool any(Pack::mask_type m) { return stdx::any_of(m); }
 };
 
@@ -36,6 +37,7 @@ public:
         stdx::where(!mask_, v) = Pack(0.0);
         return v;
     }
+    Pack::mask_type keep(Pack::mask_type m) const { return m && mask_; }
     bool any(Pack::mask_type m) const { return stdx::any_of(m && mask_); }
 
 private:

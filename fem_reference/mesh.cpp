@@ -42,13 +42,10 @@ double area(const BodySpec& body)
 }
 
 /// Cells of one body: its points, were there one per cell, stand at their centres.
-std::vector<Cell> covered_cells(const Scene& scene, const BodySpec& body, const Lattice& lattice)
+std::vector<Cell> covered_cells(const Scene& coarse, const BodySpec& body, const Lattice& lattice)
 {
-    BodySpec coarse = body;
-    coarse.points_per_cell = 1;
     std::vector<Cell> cells;
-    const GridSpec grid{lattice.origin, {lattice.nx * lattice.cell_size, lattice.ny * lattice.cell_size}, lattice.cell_size};
-    for (const Vec2& centre : fill(coarse, grid))
+    for (const Vec2& centre : fill(coarse, body))
     {
         const int i = static_cast<int>(std::floor((centre[0] - lattice.origin[0]) / lattice.cell_size));
         const int j = static_cast<int>(std::floor((centre[1] - lattice.origin[1]) / lattice.cell_size));
@@ -56,19 +53,23 @@ std::vector<Cell> covered_cells(const Scene& scene, const BodySpec& body, const 
     }
     if (cells.empty())
         throw SceneError(
-            fmt::format("{}: body '{}' holds the centre of no lattice cell; make grid.cell_size smaller", scene.path, body.name));
+            fmt::format("{}: body '{}' holds the centre of no lattice cell; make grid.cell_size smaller", coarse.path, body.name));
     return cells;
 }
 
 std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice& lattice, const Warn& warn)
 {
+    Scene coarse = scene;
+    coarse.grid = {lattice.origin, {lattice.nx * lattice.cell_size, lattice.ny * lattice.cell_size}, lattice.cell_size};
+    for (BodySpec& body : coarse.bodies)
+        body.points_per_cell = 1;
     std::map<Cell, unsigned int> owner;
     for (unsigned int b = 0; b < scene.bodies.size(); ++b)
     {
         const BodySpec& body = scene.bodies[b];
         if (body.shape == "box")
             check_box_on_lattice(scene, body, lattice);
-        const std::vector<Cell> cells = covered_cells(scene, body, lattice);
+        const std::vector<Cell> cells = covered_cells(coarse, coarse.bodies[b], lattice);
         for (const Cell& cell : cells)
             if (const auto [at, is_new] = owner.emplace(cell, b); !is_new)
                 throw SceneError(fmt::format("{}: body '{}' overlaps body '{}' in the lattice cell at ({}, {}) m; FEM cells belong to one "

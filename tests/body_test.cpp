@@ -14,7 +14,9 @@ TEST(Fill, BoxStartsAtItsOwnCorner)
     box.points_per_cell = 2;
     box.min = Vec2{0.3, 0.1};
     box.max = Vec2{1.3, 0.6};
-    const auto points = fill(box, {{0, 0}, {2, 2}, 0.5});
+    Scene scene;
+    scene.grid = {{0, 0}, {2, 2}, 0.5};
+    const auto points = fill(scene, box);
     ASSERT_EQ(points.size(), 8u);
     EXPECT_DOUBLE_EQ(points[0][0], 0.425);
     EXPECT_DOUBLE_EQ(points[0][1], 0.225);
@@ -23,17 +25,18 @@ TEST(Fill, BoxStartsAtItsOwnCorner)
 
 TEST(Fill, DiskAndPolygonAreas)
 {
-    const GridSpec grid{{-2, -2}, {4, 4}, 0.1};
+    Scene scene;
+    scene.grid = {{-2, -2}, {4, 4}, 0.1};
     BodySpec disk;
     disk.shape = "disk";
     disk.center = Vec2{0.2, -0.1};
     disk.radius = 1.3;
     const double share = 0.025 * 0.025;
-    EXPECT_NEAR(static_cast<double>(fill(disk, grid).size()) * share, 3.14159 * 1.69, 0.01);
+    EXPECT_NEAR(static_cast<double>(fill(scene, disk).size()) * share, 3.14159 * 1.69, 0.01);
     BodySpec triangle;
     triangle.shape = "polygon";
     triangle.vertices = {{-1, -1}, {1, -1}, {-1, 1}};
-    EXPECT_NEAR(static_cast<double>(fill(triangle, grid).size()) * share, 2.0, 0.05);
+    EXPECT_NEAR(static_cast<double>(fill(scene, triangle).size()) * share, 2.0, 0.05);
 }
 
 TEST(Bodies, CarryOnlyTheFieldsThatAreNeeded)

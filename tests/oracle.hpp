@@ -20,7 +20,7 @@ inline std::vector<RefPoint> reference_points(const Scene& scene)
         const Expression E(m.youngs_modulus, scene.expression_constants());
         const VectorExpression v(*body.velocity, scene.expression_constants());
         const double h = spacing(body, scene.grid);
-        for (const Vec2& X : fill(body, scene.grid))
+        for (const Vec2& X : fill(scene, body))
         {
             const Place at{X[0], X[1], X[0], X[1], 0};
             points.push_back({X[0], X[1], m.density * h * h, h * h, h / 2, h / 2, v(at)[0], v(at)[1], E(at), m.poissons_ratio,

@@ -1,7 +1,7 @@
 #pragma once
 /// Isotropic elasticity in plane strain: the stress rate D : d with the rotation of the stress left out (`linear_elastic`), to
 /// first order (`hypoelastic_jaumann`) or exact (`hypoelastic_exact_rotation`). The out-of-plane stress needs no storage:
-/// it starts from zero, so sigma_zz = nu (sigma_xx + sigma_yy) for all three.
+/// sigma_zz = nu (sigma_xx + sigma_yy) for all three.
 
 #include "core/points.hpp"
 #include "core/types.hpp"
@@ -32,10 +32,15 @@ private:
     double youngs_modulus_ = 0, poissons_ratio_ = 0, shear_ = 0, lame_ = 0;
 };
 
-/// Elastic energy per volume of a plane-strain stress [Pa].
-inline double elastic_energy_density(const ElasticModuli& m, const SymTensor<>& s)
+/// Out-of-plane stress of point p [Pa]: that of the law, if it keeps one, else the elastic one.
+inline double out_of_plane_stress(const ElasticModuli& m, const Points& q, std::size_t p)
 {
-    const double szz = m.poissons_ratio() * (s.xx + s.yy);
+    return q.szz.active() ? q.szz[p] : m.poissons_ratio() * (q.sxx[p] + q.syy[p]);
+}
+
+/// Elastic energy per volume of a stress with out-of-plane component szz [Pa].
+inline double elastic_energy_density(const ElasticModuli& m, const SymTensor<>& s, double szz)
+{
     const double normal = s.xx * s.xx + s.yy * s.yy + szz * szz;
     const double mixed = s.xx * s.yy + (s.xx + s.yy) * szz;
     return (normal - 2 * m.poissons_ratio() * mixed) / (2 * m.youngs_modulus()) + s.xy * s.xy / (2 * m.shear());
@@ -92,6 +97,9 @@ struct Hypoelastic
         SymTensor<T> stress;
     };
 
+    /// The fields of a point beyond its stress in the plane: none.
+    void allocate(Points&) const {}
+
     /// The pure point function: stress after the displacement gradient increment d.
     template <class T>
     void update(State<T>& state, const Gradient<T>& d) const
@@ -139,6 +147,8 @@ template <class Law>
 struct VaryingStiffness : Law
 {
     using Law::update;
+
+    void allocate(Points& q) const { q.stiffness.activate(q.count); }
 
     template <class Lanes>
     void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const

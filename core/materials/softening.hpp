@@ -1,0 +1,67 @@
+#pragma once
+/// Share of the cohesion that is left after a plastic shear strain: max(residual, 1 - slope strain). A drop at first yield is
+/// an infinite slope, no softening a slope of zero.
+
+#include "core/simd.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace testbed
+{
+class Softening
+{
+public:
+    Softening() = default;
+    static Softening drop(double residual) { return {residual, 1e300}; }
+    /// @param strain plastic shear strain at which the residual is reached; crack-band scaling divides it by L / t_sb
+    static Softening linear(double residual, double strain) { return {residual, (1 - residual) / strain}; }
+
+    double residual() const { return residual_; }
+
+    template <class T>
+    T share(const T& strain) const
+    {
+        return max(T(residual_), T(1.0) - T(slope_) * strain);
+    }
+
+    /// Finds the share at which excess(share) = share - share(strain that the return with it leads to) vanishes, and leaves
+    /// excess() called with it last. `strain` is the one at the start. Linear but for changes of the region of the yield
+    /// surface: regula falsi (Illinois), a few returns.
+    template <class Excess>
+    void solve(Excess&& excess, double strain) const
+    {
+        double low = residual_, high = share(strain);
+        double f_low = excess(low);
+        if (f_low >= 0 || high <= low)
+            return;
+        double f_high = excess(high);
+        int stuck = 0;
+        for (int k = 0; k < 100 && f_high > 0; ++k)
+        {
+            const double next = high - f_high * (high - low) / (f_high - f_low), f = excess(next);
+            if (std::abs(f) < 1e-14 || high - low < 1e-15)
+                return;
+            if (f > 0)
+            {
+                high = next;
+                f_high = f;
+                f_low *= stuck == 1 ? 0.5 : 1;
+                stuck = 1;
+            }
+            else
+            {
+                low = next;
+                f_low = f;
+                f_high *= stuck == -1 ? 0.5 : 1;
+                stuck = -1;
+            }
+        }
+    }
+
+private:
+    Softening(double residual, double slope) : residual_(residual), slope_(slope) {}
+
+    double residual_ = 1, slope_ = 0;
+};
+}  // namespace testbed
