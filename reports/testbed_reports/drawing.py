@@ -8,6 +8,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullForma
 from .results import ResultError
 from .style import nice_unit
 
+ESTIMATOR_NAMES = {"std": r"$\sqrt{12}$ std", "integral": "integral / maximum", "half_max": "half maximum", "exact_support": "support"}
 QUANTITY_NAMES = {
     ("stress", "l2"): "Stress error, $L_2$", ("stress", "linf"): r"Stress error, $L_\infty$",
     ("stress", "l1_yy"): r"Vertical stress error, $L_1$", ("displacement", "l2"): "Displacement error, $L_2$",
@@ -21,7 +22,20 @@ QUANTITY_NAMES = {
     ("angular_momentum", "error"): "Angular momentum error",
     ("spurious_stress", "max"): "Largest stress / Young's modulus",
     ("particle_steps_per_second", ""): "Particle steps per second [1/s]", ("bytes_per_point", ""): "Memory [B/point]",
-    ("solve_s", ""): "Solve time [s]"}
+    ("solve_s", ""): "Solve time [s]",
+    ("modulus", "initial"): "Initial modulus [Pa]", ("modulus", "ratio"): "Initial / plane strain modulus",
+    ("peak", "stress"): "Peak stress [Pa]", ("peak", "ratio"): "Peak stress / reference", ("peak", "strain"): "Strain at peak",
+    ("residual", "stress"): "Residual stress [Pa]", ("residual", "ratio"): "Residual stress / reference",
+    ("band_count", ""): "Number of shear bands", ("band_angle", "first"): "Inclination of first band [°]",
+    ("band_angle", "second"): "Inclination of second band [°]",
+    ("runout", "front"): "Position of the front [m]", ("runout", "ratio"): "Runout / reference",
+    ("surface", "rms"): "Free surface, RMS distance [m]", ("failure_line", "rms"): "Failure line, RMS distance [m]",
+    ("collapse_load", "first"): "Collapse load", ("collapse_load", "second"): "Collapse load, second threshold",
+    ("slope", "postpeak"): r"Softening slope $-\mathrm{d}u/\mathrm{d}\tau$ [m/Pa]", ("slope", "ratio"): "Softening slope / reference",
+    ("dissipation", "total"): "Dissipation [J/m$^2$]", ("dissipation", "ratio"): "Dissipation / reference",
+    ("band_width", "ratio"): "Band width / reference",
+    **{("band_width", norm): f"Band width, {words} [m]" for norm, words in ESTIMATOR_NAMES.items()},
+    **{("band_width_cells", norm): f"Band width / $L$, {words}" for norm, words in ESTIMATOR_NAMES.items()}}
 HISTORY_NAMES = {"time": ("Time $t$", "s"), "gravity_factor": ("Share of gravity", ""),
                  "kinetic_energy": ("Kinetic energy", "J/m"), "strain_energy": ("Strain energy", "J/m"),
                  "gravity_work": ("Work of gravity", "J/m"), "total_energy": ("Total energy", "J/m"),
@@ -47,6 +61,8 @@ def name_of(quantity, norm):
     """What a quantity is called on an axis."""
     if quantity == "settlement":
         return f"Settlement error, {norm}"
+    if quantity in ("reaction_max", "reaction_end"):
+        return f"{'Largest' if quantity == 'reaction_max' else 'Final'} reaction of {norm} [N/m]"
     return QUANTITY_NAMES.get((quantity, norm), f"{quantity} {norm}".replace("_", " ").strip())
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import norms
+from . import norms, soil_metrics
+from .metric_base import MetricError, need, nonzero
 from .results import TENSOR, ResultError
 from .spelling import did_you_mean
 
@@ -29,21 +30,11 @@ def is_error(quantity, norm):
     return quantity == "settlement" or (quantity, norm) in ERRORS
 
 
-class MetricError(Exception):
-    """A group that cannot be computed: says what lacks."""
-
-
 @dataclass
 class Grades:
     """Rows {(quantity, norm): value} of one run, and what could not be computed."""
     rows: dict = field(default_factory=dict)
     errors: list = field(default_factory=list)
-
-
-def _need(numbers, key, group):
-    if key not in numbers:
-        raise MetricError(f"'{group}' lacks report.reference.{key}")
-    return numbers[key]
 
 
 def _pair(snapshot, name):
@@ -53,20 +44,14 @@ def _pair(snapshot, name):
     return snapshot[name], snapshot[f"exact_{name}"], snapshot["initial_volume"]
 
 
-def _nonzero(value, what):
-    if not value > 0:
-        raise MetricError(f"{what} is zero: nothing to scale an error with")
-    return value
-
-
 def stress(result):
     s, exact, v = _pair(result.final, "stress")
     error, size = norms.frobenius(s - exact), norms.frobenius(exact)
-    _nonzero(np.max(size), "the exact stress")
+    nonzero(np.max(size), "the exact stress")
     scale = result.reference.get("stress_scale", np.max(np.abs(exact[:, TENSOR["yy"]])))
     return {("stress", "l2"): norms.l2(error, size, v),
             ("stress", "linf"): norms.linf(error, size),
-            ("stress", "l1_yy"): norms.l1_yy(s, exact, v, _nonzero(scale, "the stress scale"))}
+            ("stress", "l1_yy"): norms.l1_yy(s, exact, v, nonzero(scale, "the stress scale"))}
 
 
 def displacement(result):
@@ -77,7 +62,7 @@ def displacement(result):
     if np.max(size) > 0:
         rows = {("displacement", "l2"): norms.l2(error, size, v), ("displacement", "linf"): norms.linf(error, size)}
     elif scale is None:
-        _nonzero(0.0, "the exact displacement")
+        nonzero(0.0, "the exact displacement")
     if scale is not None:
         rows["displacement", "rms_scaled"] = norms.rms(error, v) / scale
     return rows
@@ -90,7 +75,7 @@ def settlement(result):
             continue
         u = result.probe(probe, "displacement")[-1, :2]
         exact = result.probe(probe, "exact_displacement")[-1, :2]
-        size = _nonzero(np.hypot(*exact), f"the exact displacement of probe {probe}")
+        size = nonzero(np.hypot(*exact), f"the exact displacement of probe {probe}")
         rows["settlement", probe] = np.hypot(*(u - exact)) / size
     if not rows:
         raise MetricError("'settlement' lacks a probe with exact_displacement")
@@ -99,7 +84,7 @@ def settlement(result):
 
 def static(result):
     kinetic, strain = result.history("kinetic_energy")[-1], result.history("strain_energy")[-1]
-    return {("static", "kinetic_over_strain"): kinetic / _nonzero(strain, "the strain energy"),
+    return {("static", "kinetic_over_strain"): kinetic / nonzero(strain, "the strain energy"),
             ("static", "unbalanced"): result.history("unbalanced_force")[-1]}
 
 
@@ -126,7 +111,7 @@ def first_peak(result):
     numbers, rows = result.reference, {}
     if "peak_time" in numbers:
         rows["first_peak", "time"] = found[0] / numbers["peak_time"]
-    rows["first_peak", "ratio"] = found[1] / abs(_need(numbers, "static_displacement", "first_peak"))
+    rows["first_peak", "ratio"] = found[1] / abs(need(numbers, "static_displacement", "first_peak"))
     return rows
 
 
@@ -144,7 +129,7 @@ def energy(result):
         if not len(start):
             raise MetricError(f"'energy': the record is shorter than one period ({period:g} s)")
         change = np.interp(start + period, time, total) - np.interp(start, time, total)
-        scale = _nonzero(np.max(result.history("strain_energy")), "the strain energy")
+        scale = nonzero(np.max(result.history("strain_energy")), "the strain energy")
         rows["energy_drift", "per_period"] = np.max(np.abs(change)) / scale
     if total[0] > 0:
         rows["energy_gain", "max"] = np.max(total) / total[0] - 1.0
@@ -158,12 +143,12 @@ def energy(result):
 def momentum(result):
     p = result.history("linear_momentum")
     scale = result.reference.get("momentum_scale", np.linalg.norm(p[0]))
-    return {("momentum", "error"): np.linalg.norm(p[-1] - p[0]) / _nonzero(scale, "the momentum at the start")}
+    return {("momentum", "error"): np.linalg.norm(p[-1] - p[0]) / nonzero(scale, "the momentum at the start")}
 
 
 def angular_momentum(result):
     start, end = result.history("angular_momentum")[[0, -1]]
-    _nonzero(abs(start), "the angular momentum at the start")
+    nonzero(abs(start), "the angular momentum at the start")
     return {("angular_momentum", "retained"): end / start, ("angular_momentum", "error"): abs(1.0 - end / start)}
 
 
@@ -191,6 +176,7 @@ GROUPS = {
     "momentum": (momentum, [("momentum", "error")]),
     "angular_momentum": (angular_momentum, [("angular_momentum", "retained"), ("angular_momentum", "error")]),
     "spurious_stress": (spurious_stress, [("spurious_stress", "max")]),
+    **soil_metrics.GROUPS,
 }
 
 
