@@ -66,6 +66,10 @@ std::string fields_and_modules(const Scene& scene, Solver& solver)
         modules.emplace_back("local damping");
     if (!scene.boundaries.empty())
         modules.push_back(fmt::format("{} fixities", scene.boundaries.size()));
+    if (!scene.walls.empty())
+        modules.push_back(fmt::format("{} walls", scene.walls.size()));
+    if (!scene.tractions.empty())
+        modules.push_back(fmt::format("{} tractions", scene.tractions.size()));
     if (scene.body_force)
         modules.emplace_back("body force expression");
     if (!scene.probes.empty())

@@ -22,6 +22,7 @@ struct PointNeeds
     bool box = false;              ///< half widths; the volume then follows from them
     bool velocity = false;         ///< velocity on the points
     bool initial_position = true;  ///< kept with the points, for what is evaluated there in each step
+    bool strength = true;          ///< else the elastic part of a law is all that is asked
 };
 
 Lattice make_lattice(const GridSpec& grid);

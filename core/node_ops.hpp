@@ -1,24 +1,29 @@
 #pragma once
 /// Operations at nodes, common to LPFDM and MPM: what a scene does not have is absent from the lists.
 
-#include "core/grid.hpp"
 #include "core/parallel.hpp"
-#include "core/scene.hpp"
+#include "core/walls.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <variant>
+#include <optional>
 
 namespace testbed
 {
-/// Eq. (11): F += g m, growing from zero as (1 - cos) / 2 over the ramp.
+/// Eq. (11): F += g m, growing from zero over the ramp.
 struct Gravity
 {
     Vec2 acceleration;
     double ramp;
+    bool linear = false;
 
-    double factor(double t) const { return t >= ramp ? 1 : 0.5 * (1 - std::cos(std::numbers::pi * t / ramp)); }
+    double factor(double t) const
+    {
+        if (t >= ramp)
+            return 1;
+        return linear ? t / ramp : 0.5 * (1 - std::cos(std::numbers::pi * t / ramp));
+    }
 
     void apply(Nodes& nodes, double t) const
     {
@@ -33,13 +38,18 @@ struct Gravity
     }
 };
 
+inline Gravity make_gravity(const GravitySpec& spec)
+{
+    return {spec.acceleration, spec.ramp, spec.profile == "linear"};
+}
+
 /// Eq. (15), local non-viscous damping: F -= alpha |F| sgn(v).
 struct LocalDamping
 {
     double alpha;
 
     double damped(double force, double velocity) const { return force - alpha * std::abs(force) * ((velocity > 0) - (velocity < 0)); }
-    void apply(Nodes& nodes, double) const
+    void apply(Nodes& nodes) const
     {
         parallel_for(nodes.active.size(),
                      [&](std::size_t a)
@@ -51,48 +61,47 @@ struct LocalDamping
     }
 };
 
-/// Fixed velocity components at chosen nodes.
-struct Fixity
+/// What is recorded of a support or a wall.
+struct RestraintRecord
 {
-    std::vector<std::uint32_t> x, y;
-
-    void stop(std::vector<double>& vx, std::vector<double>& vy) const
-    {
-        for (const auto i : x)
-            vx[i] = 0;
-        for (const auto i : y)
-            vy[i] = 0;
-    }
+    std::string name;
+    Vec2 reaction;                     ///< on the soil [N/m]
+    std::optional<Vec2> displacement;  ///< of a wall [m]
 };
 
-using ForceOp = std::variant<Gravity, LocalDamping>;
-
-struct NodeOps
+class NodeOps
 {
-    std::vector<ForceOp> forces;  ///< in this order: damping acts on all that stands before it
-    std::vector<Fixity> fixities;
+public:
+    /// @throws SceneError when a boundary takes no node
+    NodeOps(const Scene& scene, const Lattice& lattice);
 
-    void apply_forces(Nodes& nodes, double t) const
+    /// Takes the walls to time t, and to their velocity in the coming step.
+    /// @throws Diverged when a wall has left the lattice or has reached what stands in its way
+    void begin_step(double t, double dt);
+    void end_step(double dt)
     {
-        for (const ForceOp& op : forces)
-            std::visit([&](const auto& o) { o.apply(nodes, t); }, op);
+        for (std::size_t k = 0; k < walls_.size(); ++k)
+            walls_[k].end_step(dt, restraints_[first_wall_ + k]);
     }
-    /// To velocities, or to forces (a fixed component is not out of balance).
-    void apply_fixities(std::vector<double>& x, std::vector<double>& y) const
+    /// Gravity, the reactions of supports and walls, and damping of what is then out of balance.
+    void apply_forces(Nodes& nodes, double t);
+    /// Supports and walls prescribe the velocity.
+    void restrain(const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy) const
     {
-        for (const Fixity& f : fixities)
-            f.stop(x, y);
+        for (const Restraint& r : restraints_)
+            r.drive(nodes, vx, vy);
     }
+    bool restrains() const { return !restraints_.empty(); }
+    std::vector<RestraintRecord> records() const;
+    const std::vector<Restraint>& restraints() const { return restraints_; }
+
+private:
+    std::optional<Gravity> gravity_;
+    std::optional<LocalDamping> damping_;
+    std::vector<Restraint> restraints_;  ///< of the boundaries, then of the walls: where two prescribe, the later one does
+    std::vector<Wall> walls_;
+    std::size_t first_wall_ = 0;
 };
-
-/// @throws SceneError when a boundary takes no node
-NodeOps make_node_ops(const Scene& scene, const Lattice& lattice);
-
-/// 1/m, and zero for a node that carries no mass.
-inline double inverse_mass(const Nodes& nodes, std::size_t i)
-{
-    return nodes.mass[i] > 0 ? 1 / nodes.mass[i] : 0;
-}
 
 /// Eqs. (12), (14): v += F / m dt.
 inline void accelerate(Nodes& nodes, double dt)

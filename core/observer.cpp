@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <fmt/format.h>
+#include <set>
 
 namespace testbed
 {
@@ -70,15 +71,7 @@ Observer::Observer(const Scene& scene, const Solver& solver) : scene_(scene), so
                 exact_.stress.emplace_back(text, constants);
     }
     if (scene.gravity)
-        gravity_ = {scene.gravity->acceleration, scene.gravity->ramp};
-    history_ = {{"time", "s"},
-                {"kinetic_energy", "J/m"},
-                {"strain_energy", "J/m"},
-                {"gravity_work", "J/m"},
-                {"linear_momentum", "kg/s", 3},
-                {"angular_momentum", "kg m/s"},
-                {"unbalanced_force", "-"},
-                {"max_stress", "Pa"}};
+        gravity_ = make_gravity(*scene.gravity);
     last_moment_ = point_sums(solver.bodies()).moment;
     const std::vector<Vec2> initial = initial_positions(scene);
     for (const ProbeSpec& spec : scene.probes)
@@ -147,20 +140,45 @@ void Observer::sample(double t)
     const PointSums state = point_sums(solver_.bodies());
     if (!std::isfinite(motion.kinetic_energy) || !std::isfinite(state.strain_energy))
         throw Diverged(fmt::format("energy is not finite at t = {:.6g} s", t));
-    const double f = 0.5 * (gravity_.factor(last_time_) + gravity_.factor(t));
-    for (std::size_t k = 0; k < 2; ++k)
-        gravity_work_ += f * gravity_.acceleration[k] * (state.moment[k] - last_moment_[k]);
+    if (gravity_)
+    {
+        const double f = 0.5 * (gravity_->factor(last_time_) + gravity_->factor(t));
+        for (std::size_t k = 0; k < 2; ++k)
+            gravity_work_ += f * gravity_->acceleration[k] * (state.moment[k] - last_moment_[k]);
+        add(history_, "gravity_factor", "-", gravity_->factor(t));
+    }
     last_time_ = t;
     last_moment_ = state.moment;
-    const double row[] = {t, motion.kinetic_energy, state.strain_energy, gravity_work_};
-    for (std::size_t k = 0; k < 4; ++k)
-        history_[k].values.push_back(row[k]);
-    history_[4].values.insert(history_[4].values.end(), {motion.momentum[0], motion.momentum[1], 0});
-    history_[5].values.push_back(motion.angular_momentum);
-    history_[6].values.push_back(motion.unbalanced);
-    history_[7].values.push_back(state.max_stress);
+    add(history_, "time", "s", t);
+    add(history_, "kinetic_energy", "J/m", motion.kinetic_energy);
+    add(history_, "strain_energy", "J/m", state.strain_energy);
+    add(history_, "gravity_work", "J/m", gravity_work_);
+    add(history_, "linear_momentum", "kg/s", std::array{motion.momentum[0], motion.momentum[1], 0.0});
+    add(history_, "angular_momentum", "kg m/s", motion.angular_momentum);
+    add(history_, "unbalanced_force", "-", motion.unbalanced);
+    add(history_, "max_stress", "Pa", state.max_stress);
+    sample_restraints();
     if (!probes_.empty())
         sample_probes(t);
+}
+
+void Observer::add(std::vector<Series>& list, const std::string& name, const char* unit, std::span<const double> row)
+{
+    auto found = std::find_if(list.begin(), list.end(), [&](const Series& s) { return s.name == name; });
+    if (found == list.end())
+        found = list.insert(list.end(), {name, unit, row.size()});
+    found->values.insert(found->values.end(), row.begin(), row.end());
+}
+
+void Observer::sample_restraints()
+{
+    for (const RestraintRecord& r : solver_.restraints())
+    {
+        std::vector<Series>& series = supports_[r.name];
+        add(series, "reaction", "N/m", std::array{r.reaction[0], r.reaction[1], 0.0});
+        if (r.displacement)
+            add(series, "displacement", "m", std::array{(*r.displacement)[0], (*r.displacement)[1], 0.0});
+    }
 }
 
 void Observer::sample_probes(double t)
@@ -239,6 +257,25 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     write("volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).current_volume(at.point)}; });
     write("initial_volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).initial_volume}; });
     write("mass", "kg/m", 1, [&](At at, Here) { return Row1{points(at).mass}; });
+    const auto any_active = [&](const Field<double> Points::*field)
+    {
+        const auto& bodies = solver_.bodies();
+        return std::any_of(bodies.begin(), bodies.end(), [&](const Body& body) { return (body.points.*field).active(); });
+    };
+    const auto write_field = [&](const char* name, const char* unit, const Field<double> Points::*field, auto&& value_of)
+    {
+        if (any_active(field))
+            write(name, unit, 1,
+                  [&](At at, Here) { return Row1{(points(at).*field).active() ? value_of((points(at).*field)[at.point]) : 0.0}; });
+    };
+    const auto as_it_is = [](double v) { return v; };
+    write_field("plastic_shear_strain", "-", &Points::plastic_shear, as_it_is);
+    write_field("softening_strain", "-", &Points::softening_strain, as_it_is);
+    if (snapshot_times_.empty())  // they do not change
+    {
+        write_field("cohesion", "Pa", &Points::cohesion, as_it_is);
+        write_field("friction_angle", "rad", &Points::sin_friction, [](double sine) { return std::asin(sine); });
+    }
     if (!exact_.displacement.empty())
         write("exact_displacement", "m", 3, [&](At, Here p) { return exact_displacement(p); });
     if (!exact_.stress.empty())
@@ -259,6 +296,9 @@ void Observer::write_history(ResultFile& file) const
 {
     for (const Series& s : history_)
         file.dataset("/history/" + s.name, s.unit, s.values, s.columns);
+    for (const auto& [support, series] : supports_)
+        for (const Series& s : series)
+            file.dataset("/history/supports/" + support + "/" + s.name, s.unit, s.values, s.columns);
     for (const Probe& probe : probes_)
         for (const Series& s : probe.series)
             file.dataset("/history/probes/" + probe.name + "/" + s.name, s.unit, s.values, s.columns);
@@ -266,6 +306,8 @@ void Observer::write_history(ResultFile& file) const
 
 std::string Observer::xdmf(const std::string& file_name) const
 {
+    static const std::set<std::string> one_column{"volume",           "initial_volume", "mass",          "plastic_shear_strain",
+                                                  "softening_strain", "cohesion",       "friction_angle"};
     std::string name;
     for (const char c : file_name)
         name += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
@@ -287,7 +329,7 @@ std::string Observer::xdmf(const std::string& file_name) const
                             k, snapshot_times_[k], n, item("position", 3));
         for (const std::string& field : snapshot_fields_)
         {
-            const bool tensor = field.ends_with("stress"), scalar = field.ends_with("volume") || field == "mass";
+            const bool tensor = field.ends_with("stress"), scalar = one_column.count(field) > 0;
             text += fmt::format("<Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", field,
                                 tensor   ? "Tensor6"
                                 : scalar ? "Scalar"

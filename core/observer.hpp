@@ -5,6 +5,10 @@
 #include "core/results.hpp"
 #include "core/solver.hpp"
 
+#include <map>
+#include <optional>
+#include <span>
+
 namespace testbed
 {
 class Observer
@@ -53,12 +57,20 @@ private:
     std::array<double, 6> exact_stress(const Place& at) const;
     std::array<double, 3> exact_displacement(const Place& at) const;
     void sample_probes(double t);
+    void sample_restraints();
+    /// Adds a row to the series of that name.
+    static void add(std::vector<Series>& list, const std::string& name, const char* unit, std::span<const double> row);
+    static void add(std::vector<Series>& list, const std::string& name, const char* unit, double value)
+    {
+        add(list, name, unit, {&value, 1});
+    }
 
     const Scene& scene_;
     const Solver& solver_;
     Exact exact_;
-    Gravity gravity_{{0, 0}, 0};
+    std::optional<Gravity> gravity_;
     std::vector<Series> history_;
+    std::map<std::string, std::vector<Series>> supports_;
     std::vector<Probe> probes_;
     std::vector<double> snapshot_times_;
     std::vector<std::string> snapshot_fields_;

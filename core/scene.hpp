@@ -135,7 +135,7 @@ struct WallSpec
         v.choice("motion", motion, {"hand_off", "smooth"},
                  "hand_off: after each cell of travel the next line of nodes is driven, as published; smooth: the velocity interpolated "
                  "at the wall's face is driven");
-        v.optional("door", door, "m", "plate: an opening from .. to along the plate");
+        v.optional("door", door, "m", "an opening, from .. to along the longer side");
         v.optional("door_opens", door_opens, "s", "time at which the door opens");
     }
 };

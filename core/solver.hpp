@@ -66,6 +66,8 @@ public:
     virtual std::size_t active_cells() const = 0;
     virtual std::size_t bytes() const = 0;  ///< of all arrays
     virtual const PhaseTimer& timer() const = 0;
+    /// Supports and walls at the last prepare().
+    virtual std::vector<RestraintRecord> restraints() const = 0;
     virtual const char* kinematics() const = 0;  ///< which [exact.*] applies
     /// What time.cfl is a share of: the stability limit, or for an implicit method what it would be about [s].
     virtual double critical_time_step(const Scene& scene) { return testbed::critical_time_step(scene); }

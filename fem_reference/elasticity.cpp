@@ -1,6 +1,7 @@
 #include "fem_reference/elasticity.hpp"
 
 #include "core/geometry.hpp"
+#include "core/walls.hpp"
 
 #include <deal.II/base/quadrature_lib.h>
 #include <deal.II/base/symmetric_tensor.h>
@@ -107,26 +108,83 @@ void Elasticity::read_media()
         body_force_.emplace(scene_.body_force->acceleration, constants);
 }
 
+template <class Holds>
+void Elasticity::add_support(const std::string& name, const std::string& fix, const WallSpec* wall, Holds&& holds, const Warn& warn)
+{
+    Support support{name, wall, {}};
+    bool holds_somewhere = false;
+    for (std::size_t dof = 0; dof < nodes_.size(); ++dof)
+        if ((fix == "xy" || fix == (is_x(dof) ? "x" : "y")) && holds(nodes_[dof]))
+        {
+            holds_somewhere = true;
+            if (constraints_.is_constrained(dof))
+                continue;  // its reaction counts once
+            constraints_.add_line(dof);
+            support.dofs.push_back(dof);
+        }
+    if (!holds_somewhere)
+        warn(fmt::format("'{}' holds no node of the FEM mesh, which covers the bodies only", name));
+    supports_.push_back(std::move(support));
+}
+
 void Elasticity::find_supports(const Warn& warn)
 {
     const double reach = 1e-6 * scene_.grid.cell_size / cells_per_lattice_cell(scene_);
     for (const BoundarySpec& boundary : scene_.boundaries)
     {
         const Expression where(boundary.where, scene_.expression_constants());
-        bool holds_somewhere = false;
-        for (std::size_t dof = 0; dof < nodes_.size(); ++dof)
-        {
-            const bool wanted = boundary.fix == "xy" || boundary.fix == (is_x(dof) ? "x" : "y");
-            if (!wanted || !holds_near(where, nodes_[dof][0], nodes_[dof][1], reach))
-                continue;
-            constraints_.add_line(dof);
-            holds_somewhere = true;
-        }
-        if (!holds_somewhere)
-            warn(fmt::format("boundary '{}': where = \"{}\" holds at no node of the FEM mesh, which covers the bodies only", boundary.name,
-                             boundary.where));
+        add_support(
+            boundary.name, boundary.fix, nullptr, [&](const dealii::Point<2>& X) { return holds_near(where, X[0], X[1], reach); }, warn);
+    }
+    for (const WallSpec& wall : scene_.walls)
+    {
+        const bool open = wall.door && wall.door_opens <= scene_.time.end;
+        const auto along = static_cast<unsigned int>(door_direction(wall));
+        add_support(
+            wall.name, wall.fix, &wall,
+            [&](const dealii::Point<2>& X)
+            {
+                const bool in_door = open && X[along] > (*wall.door)[0] + reach && X[along] < (*wall.door)[1] - reach;
+                return !in_door && X[0] >= wall.min[0] - reach && X[0] <= wall.max[0] + reach && X[1] >= wall.min[1] - reach &&
+                       X[1] <= wall.max[1] + reach;
+            },
+            warn);
     }
     constraints_.close();
+}
+
+Vector Elasticity::prescribed(double t) const
+{
+    Vector u(dofs_.n_dofs());
+    for (const Support& support : supports_)
+        if (support.wall && support.wall->velocity)
+        {
+            const Vec2 travel = wall_path(*support.wall, scene_.expression_constants(), t).back();
+            for (const auto dof : support.dofs)
+                u(dof) = travel[component_[dof]];
+        }
+    return u;
+}
+
+std::vector<RestraintRecord> Elasticity::restraints(const Vector& displacement, double t) const
+{
+    Vector reaction(displacement.size());
+    if (!stiffness_.empty())
+    {
+        stiffness_.vmult(reaction, displacement);
+        reaction -= load(t);
+    }
+    std::vector<RestraintRecord> records;
+    for (const Support& support : supports_)
+    {
+        RestraintRecord record{support.name, {0, 0}, {}};
+        for (const auto dof : support.dofs)
+            record.reaction[component_[dof]] += reaction(dof);
+        if (support.wall)
+            record.displacement = wall_path(*support.wall, scene_.expression_constants(), t).back();
+        records.push_back(std::move(record));
+    }
+    return records;
 }
 
 void Elasticity::make_sparsity()
@@ -238,9 +296,11 @@ Vector Elasticity::load(double t) const
 {
     Vector force(dofs_.n_dofs());
     if (scene_.gravity)
-        force.equ(Gravity{scene_.gravity->acceleration, scene_.gravity->ramp}.factor(t), weight_);
+        force.equ(make_gravity(*scene_.gravity).factor(t), weight_);
     if (body_force_)
         add_body_force(t, force);
+    if (!scene_.tractions.empty())
+        add_tractions(t, force);
     return force;
 }
 
@@ -260,6 +320,35 @@ void Elasticity::add_body_force(double t, Vector& force) const
             for (unsigned int i = 0; i < ids.size(); ++i)
                 force(ids[i]) += mass * b[component_[ids[i]]] * values.shape_value(i, q);
         }
+    }
+}
+
+void Elasticity::add_tractions(double t, Vector& force) const
+{
+    using namespace dealii;
+    FEFaceValues<2> values(element_, QGauss<1>(element_.degree + 1), update_values | update_quadrature_points | update_JxW_values);
+    std::vector<types::global_dof_index> ids(element_.n_dofs_per_cell());
+    for (const TractionSpec& spec : scene_.tractions)
+    {
+        const BodySpec& body = scene_.body(spec.body);
+        const unsigned int normal = spec.face == "left" || spec.face == "right" ? 0 : 1;
+        const double face = (spec.face == "left" || spec.face == "bottom" ? *body.min : *body.max)[normal];
+        const VectorExpression traction(spec.traction, scene_.expression_constants());
+        for (const auto& cell : dofs_.active_cell_iterators())
+            for (const unsigned int f : cell->face_indices())
+            {
+                if (!cell->at_boundary(f) || scene_.bodies[cell->material_id()].name != spec.body ||
+                    std::abs(cell->face(f)->center()[normal] - face) > 1e-6 * scene_.grid.cell_size)
+                    continue;
+                values.reinit(cell, f);
+                cell->get_dof_indices(ids);
+                for (const unsigned int q : values.quadrature_point_indices())
+                {
+                    const Vec2 p = traction(place_of(values.quadrature_point(q), t));
+                    for (unsigned int i = 0; i < ids.size(); ++i)
+                        force(ids[i]) += p[component_[ids[i]]] * values.shape_value(i, q) * values.JxW(q);
+                }
+            }
     }
 }
 

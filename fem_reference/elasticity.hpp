@@ -53,6 +53,10 @@ public:
     Vector initial_velocity() const;
     /// Zero where a component is held.
     void hold(Vector& field) const { constraints_.set_zero(field); }
+    /// Displacement that moving walls prescribe at time t, zero elsewhere [m].
+    Vector prescribed(double t) const;
+    /// Reactions to a displacement, and where walls are at time t.
+    std::vector<RestraintRecord> restraints(const Vector& displacement, double t) const;
     /// stiffness K + mass M, with nothing but the diagonal in rows and columns where a component is held.
     void combine(double stiffness, double mass, Matrix& result) const;
 
@@ -87,7 +91,17 @@ private:
         dealii::FullMatrix<double> consistent;
         std::vector<double> share, lumped;  ///< integrals of the shape functions by Gauss and by Gauss-Lobatto quadrature
     };
+    /// Held components of one boundary or wall.
+    struct Support
+    {
+        std::string name;
+        const WallSpec* wall;  ///< none for a boundary
+        std::vector<dealii::types::global_dof_index> dofs;
+    };
     void read_media();
+    template <class Holds>
+    void add_support(const std::string& name, const std::string& fix, const WallSpec* wall, Holds&& holds, const Warn& warn);
+    void add_tractions(double t, Vector& force) const;
     void find_supports(const Warn& warn);
     void make_sparsity();
     double stiffness_ratio(const Medium& medium, const dealii::Point<2>& X) const;
@@ -105,6 +119,7 @@ private:
     Vector lumped_mass_, weight_;  ///< weight: of the full gravity
     std::vector<Medium> media_;
     std::optional<VectorExpression> body_force_;
+    std::vector<Support> supports_;
     std::vector<dealii::Point<2>> nodes_;
     std::vector<unsigned char> component_;
 };

@@ -14,7 +14,7 @@ namespace testbed
 FemSolver::FemSolver(const Scene& scene, const Warn& warn, MassKind mass_kind)
     : path_(scene.path),
       lattice_(mesh_lattice(scene)),
-      bodies_(make_bodies(scene, make_lattice(scene.grid), {})),
+      bodies_(make_bodies(scene, make_lattice(scene.grid), {.strength = false})),
       elasticity_(scene, lattice_, warn),
       sampler_(scene, lattice_, elasticity_.dofs(), bodies_),
       mass_kind_(mass_kind)
@@ -122,16 +122,21 @@ public:
     void advance(double dt) override
     {
         timer_("loads", [&] { load_ = elasticity_.load(time_ + dt); });
+        double driving = 0;
         try
         {
             timer_("factorisation", [&] { factorise(); });
             timer_("solve",
                    [&]
                    {
-                       displacement_ = load_;
+                       const Vector walls = elasticity_.prescribed(time_ + dt);
+                       elasticity_.stiffness().vmult(displacement_, walls);
+                       displacement_.sadd(-1, 1, load_);
                        elasticity_.hold(displacement_);
+                       driving = displacement_.l2_norm();
                        factors_.solve(displacement_);
                        elasticity_.hold(displacement_);
+                       displacement_ += walls;
                    });
         }
         catch (const dealii::ExceptionBase&)
@@ -139,7 +144,7 @@ public:
             fail();
         }
         // a mechanism within the mesh, such as cells that meet in a corner, may pass the factorisation by rounding
-        if (!(displacement_.linfty_norm() < 1e6 * extent_) || !(imbalance().l2_norm() <= 1e-6 * load_.l2_norm()))
+        if (!(displacement_.linfty_norm() < 1e6 * extent_) || !(imbalance().l2_norm() <= 1e-6 * driving))
             fail();
     }
 
@@ -284,8 +289,11 @@ std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
     const bool damped = scene.damping && scene.damping->local > 0;
     const bool ramped = scene.gravity && scene.gravity->ramp > 0;
     const std::string& analysis = scene.fem.analysis;
-    if (analysis == "static" || (analysis == "auto" && (damped || ramped || scene.time.stop_unbalanced)))
+    const bool moving = std::any_of(scene.walls.begin(), scene.walls.end(), [](const WallSpec& wall) { return wall.velocity.has_value(); });
+    if (analysis == "static" || (analysis == "auto" && (damped || ramped || moving || scene.time.stop_unbalanced)))
         return std::make_unique<StaticFem>(scene, say);
+    if (moving)
+        throw SceneError(fmt::format("{}: walls move only in fem.analysis = \"static\" (the state at time.end)", scene.path));
     if (damped)
         throw SceneError(fmt::format("{}: fem.analysis = \"dynamic\" has no local damping; take the damping out (--set damping.local=0), "
                                      "or set fem.analysis = \"static\" for the state at rest",

@@ -25,6 +25,7 @@ public:
     std::size_t active_cells() const override { return elasticity_.cells(); }
     std::size_t bytes() const override;
     const PhaseTimer& timer() const override { return timer_; }
+    std::vector<RestraintRecord> restraints() const override { return elasticity_.restraints(displacement_, time_); }
     const char* kinematics() const override { return "small_strain"; }
     /// The limit of a cell as large as the distance of nodes, without damping.
     double critical_time_step(const Scene& scene) override;

@@ -1,6 +1,6 @@
 #include "lpfdm/lpfdm.hpp"
 
-#include "core/body_force.hpp"
+#include "core/point_loads.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
 
@@ -16,15 +16,15 @@ class Lpfdm final : public Solver
 public:
     explicit Lpfdm(const Scene& scene)
         : grid_(make_lattice(scene.grid)),
-          bodies_(make_bodies(scene, grid_.lattice, {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
-          node_ops_(make_node_ops(scene, grid_.lattice)),
+          bodies_(make_bodies(scene, grid_.lattice, {.box = Support::has_box, .initial_position = has_point_loads(scene)})),
+          node_ops_(scene, grid_.lattice),
           was_active_(grid_.lattice.nodes(), 0),
           options_(scene.lpfdm)
     {
-        if (scene.body_force)
+        if (has_point_loads(scene))
         {
             cell_force_.resize(grid_.lattice.cells());
-            body_force_.emplace(*scene.body_force, scene.expression_constants());
+            point_loads_.emplace(scene);
         }
         if (options_.hourglass > 0)
             hourglass_.resize(grid_.lattice.cells());
@@ -38,6 +38,7 @@ public:
 
     void prepare(double t, double dt) override
     {
+        node_ops_.begin_step(t, dt);
         timer_("bins",
                [&]
                {
@@ -51,7 +52,7 @@ public:
                {
                    extend_to_frontier();
                    convect_velocity(dt);
-                   node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
+                   node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
                });
         if (!hourglass_.empty())
             timer_("hourglass", [&] { resist_hourglass(grid_, options_.hourglass * wave_speed_ / grid_.lattice.cell_size, hourglass_); });
@@ -59,10 +60,9 @@ public:
         timer_("node operations (11)(15)",
                [&]
                {
-                   if (body_force_)
-                       add_body_force(t);
+                   if (point_loads_)
+                       add_point_loads(t);
                    node_ops_.apply_forces(nodes_, t);
-                   node_ops_.apply_fixities(nodes_.fx, nodes_.fy);
                });
         lag_ = started_ ? 0.5 * dt : 0;
     }
@@ -74,7 +74,7 @@ public:
                [&]
                {
                    accelerate(nodes_, started_ ? dt : 0.5 * dt);
-                   node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
+                   node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
                });
         started_ = true;
         timer_("cell strain (5)", [&] { cell_gradients(grid_, dt); });
@@ -84,6 +84,7 @@ public:
                    for (Body& body : bodies_)
                        moved_ |= std::visit([&](const auto& law) { return move_points<Support>(grid_, body, law, dt); }, body.material);
                });
+        node_ops_.end_step(dt);
     }
 
     MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, lag_, internal_); }
@@ -116,9 +117,10 @@ public:
     std::size_t bytes() const override
     {
         return bytes_of(bodies_) + grid_.bytes() + was_active_.capacity() + workspace_.capacity() * sizeof(double) +
-               (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0);
+               (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) + (point_loads_ ? point_loads_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
+    std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
 
 private:
@@ -197,10 +199,10 @@ private:
             convect<CentralConvection>(grid_, dt);
     }
 
-    void add_body_force(double t)
+    void add_point_loads(double t)
     {
-        body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather, t,
-                                             [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
+        point_loads_->template apply<Support>(grid_.lattice, bodies_, grid_.gather, t,
+                                              [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
         grid_.for_each_node(
             [&](std::size_t i, std::size_t first_cell)
             {
@@ -255,7 +257,7 @@ private:
     LpfdmSpec options_;
     std::vector<double> workspace_;             ///< sums of bins, and the way of a field to its new order
     std::vector<Vec2> hourglass_, cell_force_;  ///< empty unless the scene has them
-    std::optional<BodyForce> body_force_;
+    std::optional<PointLoads> point_loads_;
     PhaseTimer timer_;
     double wave_speed_ = 0, internal_ = 0, lag_ = 0;
     bool moved_ = false, started_ = false;

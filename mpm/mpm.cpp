@@ -1,7 +1,7 @@
 #include "mpm/mpm.hpp"
 
-#include "core/body_force.hpp"
 #include "core/gather.hpp"
+#include "core/point_loads.hpp"
 #include "mpm/transfer.hpp"
 
 #include <atomic>
@@ -17,20 +17,20 @@ class Mpm final : public Solver
 public:
     explicit Mpm(const Scene& scene)
         : lattice_(make_lattice(scene.grid)),
-          bodies_(
-              make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true, .initial_position = scene.body_force.has_value()})),
-          node_ops_(make_node_ops(scene, lattice_)),
+          bodies_(make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true, .initial_position = has_point_loads(scene)})),
+          node_ops_(scene, lattice_),
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
           options_(scene.mpm)
     {
-        if (scene.body_force)
-            body_force_.emplace(*scene.body_force, scene.expression_constants());
+        if (has_point_loads(scene))
+            point_loads_.emplace(scene);
         rebuild();
     }
 
     void prepare(double t, double dt) override
     {
+        node_ops_.begin_step(t, dt);
         timer_("bins",
                [&]
                {
@@ -39,26 +39,35 @@ public:
                });
         if (options_.scheme == "usf")
         {
-            timer_("points to nodes", [&] { points_to_nodes<Scatter::momentum>(); });
+            timer_("points to nodes",
+                   [&]
+                   {
+                       points_to_nodes<Scatter::momentum>();
+                       restrain_mapped_velocity();
+                   });
             if (started_)
                 timer_("stress", [&] { update_stress(dt); });
             timer_("points to nodes", [&] { points_to_nodes<Scatter::force>(); });
         }
         else
-            timer_("points to nodes", [&] { points_to_nodes<Scatter::momentum_and_force>(); });
+            timer_("points to nodes",
+                   [&]
+                   {
+                       points_to_nodes<Scatter::momentum_and_force>();
+                       restrain_mapped_velocity();
+                   });
         internal_ = force_norm(nodes_);
         timer_("node operations",
                [&]
                {
-                   if (body_force_)
-                       body_force_->template apply<Shape>(lattice_, bodies_, gather_, t,
-                                                          [&](std::size_t n, const std::array<double, 2>& f)
-                                                          {
-                                                              nodes_.fx[n] += f[0];
-                                                              nodes_.fy[n] += f[1];
-                                                          });
+                   if (point_loads_)
+                       point_loads_->template apply<Shape>(lattice_, bodies_, gather_, t,
+                                                           [&](std::size_t n, const std::array<double, 2>& f)
+                                                           {
+                                                               nodes_.fx[n] += f[0];
+                                                               nodes_.fy[n] += f[1];
+                                                           });
                    node_ops_.apply_forces(nodes_, t);
-                   node_ops_.apply_fixities(nodes_.fx, nodes_.fy);
                });
         lag_ = started_ ? 0.5 * dt : 0;
     }
@@ -82,6 +91,7 @@ public:
                            carrier_y_[n] = nodes_.vy[n];
                        }
                        points_to_nodes<Scatter::momentum>();
+                       node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
                    });
             timer_("points, material", [&] { move_points<true>(carrier_x_, carrier_y_, dt); });
         }
@@ -89,6 +99,7 @@ public:
             timer_("points, material", [&] { move_points<true>(nodes_.vx, nodes_.vy, dt); });
         else
             timer_("points", [&] { move_points<false>(nodes_.vx, nodes_.vy, dt); });
+        node_ops_.end_step(dt);
     }
 
     MotionSums sums() const override { return nodal_sums(lattice_, nodes_, lag_, internal_); }
@@ -105,10 +116,12 @@ public:
     std::size_t bytes() const override
     {
         return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() +
-               (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity()) * sizeof(double) +
-               (body_force_ ? body_force_->bytes() : 0);
+               (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
+                   sizeof(double) +
+               (point_loads_ ? point_loads_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
+    std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
 
 private:
@@ -155,23 +168,37 @@ private:
                                nodes_.fy[i] = s[Q - 1];
                            }
                        });
-        node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
+    }
+
+    /// Supports and walls prescribe the velocity; the mapped one is kept, because the points feel the difference.
+    void restrain_mapped_velocity()
+    {
+        if (!node_ops_.restrains())
+            return;
+        mapped_x_.resize(nodes_.vx.size());
+        mapped_y_.resize(nodes_.vy.size());
+        for (const auto n : nodes_.active)
+        {
+            mapped_x_[n] = nodes_.vx[n];
+            mapped_y_[n] = nodes_.vy[n];
+        }
+        node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
     }
 
     /// v += F / m dt; from here on the force holds the increment of the velocity.
     void accelerate_and_keep_increment(double dt)
     {
+        accelerate(nodes_, dt);
+        node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
+        const bool restrained = node_ops_.restrains();
         parallel_for(nodes_.active.size(),
                      [&](std::size_t a)
                      {
                          const std::size_t i = nodes_.active[a];
                          const double step = inverse_mass(nodes_, i) * dt;
-                         nodes_.fx[i] *= step;
-                         nodes_.fy[i] *= step;
-                         nodes_.vx[i] += nodes_.fx[i];
-                         nodes_.vy[i] += nodes_.fy[i];
+                         nodes_.fx[i] = restrained ? nodes_.vx[i] - mapped_x_[i] : nodes_.fx[i] * step;
+                         nodes_.fy[i] = restrained ? nodes_.vy[i] - mapped_y_[i] : nodes_.fy[i] * step;
                      });
-        node_ops_.apply_fixities(nodes_.vx, nodes_.vy);
     }
 
     /// kernel(body, law, bin, frame) for every bin of every body.
@@ -274,7 +301,8 @@ private:
     MpmSpec options_;
     std::vector<double> workspace_;  ///< sums of bins, and the way of a field to its new order
     std::vector<double> carrier_x_, carrier_y_;
-    std::optional<BodyForce> body_force_;
+    std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls
+    std::optional<PointLoads> point_loads_;
     PhaseTimer timer_;
     double internal_ = 0, lag_ = 0;
     bool moved_ = false, started_ = false;

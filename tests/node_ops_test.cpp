@@ -83,10 +83,10 @@ where = "x <= -1"
 fix = "x"
 )");
     const Lattice lattice = make_lattice(scene.grid);
-    const NodeOps ops = make_node_ops(scene, lattice);
-    EXPECT_EQ(ops.forces.size(), 2u);
+    const NodeOps ops(scene, lattice);
+    EXPECT_EQ(ops.restraints().size(), 2u);
     std::vector<double> vx(lattice.nodes(), 1), vy(lattice.nodes(), 1);
-    ops.apply_fixities(vx, vy);
+    ops.restrain(Nodes(lattice.nodes()), vx, vy);
     EXPECT_EQ(vy[lattice.node(3, 0)], 0);
     EXPECT_EQ(vx[lattice.node(0, 3)], 0);
     EXPECT_EQ(vy[lattice.node(0, 3)], 1);
@@ -97,12 +97,12 @@ fix = "x"
 TEST(NodeOps, WhatASceneDoesNotHaveIsAbsent)
 {
     const Scene scene = test::load(test::two_bodies());
-    const NodeOps ops = make_node_ops(scene, make_lattice(scene.grid));
-    EXPECT_TRUE(ops.forces.empty() && ops.fixities.empty());
+    const NodeOps ops(scene, make_lattice(scene.grid));
+    EXPECT_FALSE(ops.restrains());
 }
 
 TEST(NodeOps, ABoundaryWithoutNodesIsAnError)
 {
     const Scene scene = test::load(test::two_bodies() + "[[boundary]]\nname = \"far\"\nwhere = \"y > 100\"\nfix = \"x\"\n");
-    EXPECT_THROW(make_node_ops(scene, make_lattice(scene.grid)), SceneError);
+    EXPECT_THROW(NodeOps(scene, make_lattice(scene.grid)), SceneError);
 }

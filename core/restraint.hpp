@@ -1,0 +1,89 @@
+#pragma once
+/// Velocities that supports and walls prescribe at nodes, and the force it takes.
+
+#include "core/grid.hpp"
+
+#include <cmath>
+#include <string>
+
+namespace testbed
+{
+/// 1/m, and zero for a node that carries no mass.
+inline double inverse_mass(const Nodes& nodes, std::size_t i)
+{
+    return nodes.mass[i] > 0 ? 1 / nodes.mass[i] : 0;
+}
+
+/// Two neighbouring nodes on either side of a wall's face: the velocity interpolated at the face is prescribed.
+struct FacePair
+{
+    std::uint32_t low, high;
+    double share;  ///< of `high` in the interpolation, in (0, 1)
+};
+
+/// Restrains one component, x or y, at some nodes.
+struct ComponentRestraint
+{
+    std::vector<std::uint32_t> nodes;
+    std::vector<FacePair> pairs;
+    double velocity = 0;  ///< [m/s]
+
+    bool empty() const { return nodes.empty() && pairs.empty(); }
+
+    /// Brings the velocity v to the prescribed one: at a pair by the impulse that the face passes on to both nodes.
+    void drive(const Nodes& carrier, std::vector<double>& v) const
+    {
+        for (const auto i : nodes)
+            v[i] = velocity;
+        for (const FacePair& p : pairs)
+        {
+            const auto [low, high] = impulse(carrier, p, velocity - ((1 - p.share) * v[p.low] + p.share * v[p.high]));
+            v[p.low] += low * inverse_mass(carrier, p.low);
+            v[p.high] += high * inverse_mass(carrier, p.high);
+        }
+    }
+    /// Adds the reaction to the force f, so that the prescribed velocity stays; returns it [N/m].
+    double react(const Nodes& carrier, std::vector<double>& f) const
+    {
+        double reaction = 0;
+        for (const auto i : nodes)
+        {
+            reaction -= f[i];
+            f[i] = 0;
+        }
+        for (const FacePair& p : pairs)
+        {
+            const double a = (1 - p.share) * f[p.low] * inverse_mass(carrier, p.low) + p.share * f[p.high] * inverse_mass(carrier, p.high);
+            const auto [low, high] = impulse(carrier, p, -a);
+            f[p.low] += low;
+            f[p.high] += high;
+            reaction += low + high;
+        }
+        return reaction;
+    }
+
+private:
+    /// What the face gives to both nodes to change its own velocity by dv; nothing to a node without mass.
+    static std::pair<double, double> impulse(const Nodes& carrier, const FacePair& p, double dv)
+    {
+        const double a = 1 - p.share, b = p.share;
+        const double compliance = a * a * inverse_mass(carrier, p.low) + b * b * inverse_mass(carrier, p.high);
+        const double size = compliance > 0 ? dv / compliance : 0;
+        return {carrier.mass[p.low] > 0 ? a * size : 0, carrier.mass[p.high] > 0 ? b * size : 0};
+    }
+};
+
+/// A support or a wall as the nodes see it.
+struct Restraint
+{
+    std::string name;
+    ComponentRestraint x, y;
+    Vec2 reaction{0, 0};  ///< on the soil [N/m]
+
+    void drive(const Nodes& carrier, std::vector<double>& vx, std::vector<double>& vy) const
+    {
+        x.drive(carrier, vx);
+        y.drive(carrier, vy);
+    }
+};
+}  // namespace testbed

@@ -1,0 +1,159 @@
+#include "core/walls.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <iterator>
+
+namespace testbed
+{
+namespace
+{
+constexpr double slack = 1e-6;  // cells
+}
+
+Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice) : spec_(spec), lattice_(lattice)
+{
+    if (spec.velocity)
+        velocity_.emplace(*spec.velocity, scene.expression_constants());
+}
+
+void Wall::begin_step(double t, double dt, Restraint& restraint)
+{
+    new_nodes_.clear();
+    if (const Region now = region(t); now != taken_)
+    {
+        check_on_lattice(now, t);
+        take_nodes(now, restraint);
+        if (spec_.motion == "smooth")
+            take_faces(now, restraint);
+        taken_ = now;
+    }
+    if (!velocity_)
+        return;
+    const Vec2 v = (*velocity_)({.t = t + 0.5 * dt});
+    restraint.x.velocity = v[0];
+    restraint.y.velocity = v[1];
+}
+
+void Wall::end_step(double dt, const Restraint& restraint)
+{
+    travel_[0] += dt * restraint.x.velocity;
+    travel_[1] += dt * restraint.y.velocity;
+}
+
+Wall::Region Wall::region(double t) const
+{
+    Region r{spec_.min, spec_.max, spec_.door && t >= spec_.door_opens};
+    for (std::size_t k = 0; k < 2; ++k)
+    {
+        double shift = travel_[k];
+        if (spec_.motion == "hand_off")
+            shift = lattice_.cell_size * std::trunc(shift / lattice_.cell_size + std::copysign(slack, shift));
+        r.min[k] += shift;
+        r.max[k] += shift;
+    }
+    return r;
+}
+
+/// Whether a place in the wall lies in its open door.
+bool Wall::is_open_at(const Region& region, const Vec2& place) const
+{
+    if (!region.door_open)
+        return false;
+    const std::size_t along = door_direction(spec_);
+    const double at = place[along] - (region.min[along] - spec_.min[along]), reach = slack * lattice_.cell_size;
+    return at > (*spec_.door)[0] + reach && at < (*spec_.door)[1] - reach;
+}
+
+/// The nodes on and in the wall.
+void Wall::take_nodes(const Region& region, Restraint& restraint)
+{
+    const double L = lattice_.cell_size;
+    const auto first = [&](std::size_t k) { return static_cast<int>(std::ceil((region.min[k] - lattice_.origin[k]) / L - slack)); };
+    const auto last = [&](std::size_t k) { return static_cast<int>(std::floor((region.max[k] - lattice_.origin[k]) / L + slack)); };
+    std::vector<std::uint32_t> nodes;
+    // a wall that ends at the edge of the lattice takes the ring around it, too
+    const auto low = [&](std::size_t k) { return first(k) <= 0 ? -1 : first(k); };
+    const auto high = [&](std::size_t k, int n) { return last(k) >= n ? n + 1 : last(k); };
+    for (int j = low(1); j <= high(1, lattice_.ny); ++j)
+        for (int i = low(0); i <= high(0, lattice_.nx); ++i)
+            if (const std::size_t n = lattice_.node(i, j); !is_open_at(region, lattice_.node_position(n)))
+                nodes.push_back(static_cast<std::uint32_t>(n));
+    if (taken_)
+        std::set_difference(nodes.begin(), nodes.end(), covered_.begin(), covered_.end(), std::back_inserter(new_nodes_));
+    covered_ = nodes;
+    for (ComponentRestraint* component : {&restraint.x, &restraint.y})
+        component->pairs.clear();
+    restraint.x.nodes = spec_.fix == "y" ? std::vector<std::uint32_t>{} : nodes;
+    restraint.y.nodes = spec_.fix == "x" ? std::vector<std::uint32_t>{} : std::move(nodes);
+}
+
+/// Where a face lies between two lines of nodes, the pairs across it take the place of the nodes next to it.
+void Wall::take_faces(const Region& region, Restraint& restraint) const
+{
+    const double L = lattice_.cell_size;
+    std::vector<FacePair> pairs;
+    for (std::size_t normal = 0; normal < 2; ++normal)
+    {
+        const std::size_t along = 1 - normal;
+        const auto cells = [&](double x, std::size_t k) { return (x - lattice_.origin[k]) / L; };
+        const int from = std::max(0, static_cast<int>(std::ceil(cells(region.min[along], along) - slack)));
+        const int to =
+            std::min(along == 0 ? lattice_.nx : lattice_.ny, static_cast<int>(std::floor(cells(region.max[along], along) + slack)));
+        const bool is_plate = region.min[normal] == region.max[normal];
+        if (!is_plate && region.min[along] == region.max[along])
+            continue;  // the thin ends of a plate
+        for (const double face : {region.min[normal], region.max[normal]})
+        {
+            const double position = cells(face, normal), below = std::floor(position + slack), share = position - below;
+            if (share < slack)
+                continue;  // on a line of nodes
+            for (int k = from; k <= to; ++k)
+            {
+                const int line = static_cast<int>(below);
+                const auto low = normal == 0 ? lattice_.node(line, k) : lattice_.node(k, line);
+                const auto high = normal == 0 ? lattice_.node(line + 1, k) : lattice_.node(k, line + 1);
+                Vec2 place = lattice_.node_position(low);
+                place[normal] = face;
+                if (!is_open_at(region, place))
+                    pairs.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high), share});
+            }
+            if (is_plate)
+                break;
+        }
+    }
+    for (ComponentRestraint* component : {&restraint.x, &restraint.y})
+    {
+        if (spec_.fix == (component == &restraint.x ? "y" : "x"))
+            continue;
+        component->pairs = pairs;
+        std::erase_if(component->nodes, [&](std::uint32_t n)
+                      { return std::any_of(pairs.begin(), pairs.end(), [&](const FacePair& p) { return p.low == n || p.high == n; }); });
+    }
+}
+
+void Wall::check_on_lattice(const Region& region, double t) const
+{
+    const double reach = slack * lattice_.cell_size;
+    const Vec2 extent{lattice_.nx * lattice_.cell_size, lattice_.ny * lattice_.cell_size};
+    for (std::size_t k = 0; k < 2; ++k)
+        if (region.min[k] < lattice_.origin[k] - reach || region.max[k] > lattice_.origin[k] + extent[k] + reach)
+            throw Diverged(fmt::format("wall '{}' left the lattice at t = {:.6g} s", spec_.name, t));
+}
+
+std::vector<Vec2> wall_path(const WallSpec& spec, const Constants& constants, double end)
+{
+    std::vector<Vec2> path{{0, 0}};
+    if (!spec.velocity)
+        return path;
+    const VectorExpression velocity(*spec.velocity, constants);
+    constexpr int steps = 2000;
+    for (int n = 0; n < steps; ++n)
+    {
+        const Vec2 v = velocity({.t = (n + 0.5) * end / steps}), &last = path.back();
+        path.push_back({last[0] + v[0] * end / steps, last[1] + v[1] * end / steps});
+    }
+    return path;
+}
+}  // namespace testbed

@@ -1,0 +1,53 @@
+#pragma once
+/// Moving walls (section 2.2 of the paper): all nodes lined up at the wall get its displacement increments; after one cell of
+/// travel the next line does. And a smooth variant, which prescribes the velocity at the wall's faces, wherever they lie.
+
+#include "core/body.hpp"
+#include "core/restraint.hpp"
+
+namespace testbed
+{
+class Wall
+{
+public:
+    Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice);
+
+    /// Sets the restraint to the nodes that the wall covers at time t, and to its velocity in the middle of the coming step.
+    /// @throws Diverged if the wall has left the lattice
+    void begin_step(double t, double dt, Restraint& restraint);
+    void end_step(double dt, const Restraint& restraint);
+
+    const Vec2& displacement() const { return travel_; }
+    /// Nodes that the last begin_step() added; not those of the start.
+    const std::vector<std::uint32_t>& new_nodes() const { return new_nodes_; }
+
+private:
+    struct Region
+    {
+        Vec2 min, max;
+        bool door_open = false;
+        bool operator==(const Region&) const = default;
+    };
+    Region region(double t) const;
+    bool is_open_at(const Region& region, const Vec2& place) const;
+    void take_nodes(const Region& region, Restraint& restraint);
+    void take_faces(const Region& region, Restraint& restraint) const;
+    void check_on_lattice(const Region& region, double t) const;
+
+    WallSpec spec_;
+    Lattice lattice_;
+    std::optional<VectorExpression> velocity_;
+    Vec2 travel_{0, 0};
+    std::optional<Region> taken_;
+    std::vector<std::uint32_t> covered_, new_nodes_;
+};
+
+/// The coordinate along which a wall's door opens: that of its longer side.
+inline std::size_t door_direction(const WallSpec& wall)
+{
+    return wall.max[0] - wall.min[0] >= wall.max[1] - wall.min[1] ? 0 : 1;
+}
+
+/// Displacement of a wall at equal intervals from 0 to `end` [m]. @throws ExpressionError
+std::vector<Vec2> wall_path(const WallSpec& spec, const Constants& constants, double end);
+}  // namespace testbed
