@@ -26,20 +26,47 @@ def _usable(size, error):
     return size[good], error[good]
 
 
-def fit_order(size, error):
-    """Least-squares slope of log(error) against log(size); both (K,). Points that are not positive are left out."""
-    size, error = _usable(size, error)
+def _fit(size, value):
+    """(slope, intercept, half widths of their 95 % intervals, points) of log(value) over log(size), both (K,); nan for what K is too
+    few for. Points that are not positive are left out."""
+    size, value = _usable(size, value)
     if len(np.unique(size)) < 2:
-        return Order(np.nan, np.nan, np.nan, len(size))
-    x, y = np.log(size), np.log(error)
+        return np.nan, np.nan, np.nan, np.nan, len(size)
+    x, y = np.log(size), np.log(value)
     spread = np.sum((x - x.mean()) ** 2)
     slope = np.sum((x - x.mean()) * (y - y.mean())) / spread
+    intercept = y.mean() - slope * x.mean()
     if len(x) < 3:
-        return Order(float(slope), np.nan, np.nan, len(x))
-    residual = y - y.mean() - slope * (x - x.mean())
-    deviation = np.sqrt(np.sum(residual**2) / (len(x) - 2) / spread)
-    half = stdtrit(len(x) - 2, 0.975) * deviation  # Student's t
-    return Order(float(slope), float(slope - half), float(slope + half), len(x))
+        return slope, intercept, np.nan, np.nan, len(x)
+    deviation = np.sqrt(np.sum((y - intercept - slope * x) ** 2) / (len(x) - 2))
+    student = stdtrit(len(x) - 2, 0.975)
+    return (slope, intercept, student * deviation / np.sqrt(spread),
+            student * deviation * np.sqrt(1.0 / len(x) + x.mean() ** 2 / spread), len(x))
+
+
+def fit_order(size, error):
+    """Least-squares slope of log(error) against log(size); both (K,). Points that are not positive are left out."""
+    slope, _, half, _, points = _fit(size, error)
+    return Order(float(slope), float(slope - half), float(slope + half), points)
+
+
+@dataclass
+class PowerLaw:
+    """value = a L^q: the exponent, and the factor (the value at L = 1 m) with its 95 % interval."""
+    q: Order
+    a: float
+    a_low: float
+    a_high: float
+
+    def __call__(self, size):
+        return self.a * size**self.q.order
+
+
+def fit_power(size, value):
+    """Least squares of log(value) over log(size), both (K,), such as one pair per run."""
+    _, intercept, _, half, _ = _fit(size, value)
+    return PowerLaw(fit_order(size, value), *(float(np.exp(intercept + sign * half)) if sign else float(np.exp(intercept))
+                                              for sign in (0, -1, 1)))
 
 
 def pairwise_orders(size, error):

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from .results import ResultError
-from .style import nice_unit
+from .style import RAIL, nice_unit
 
 ESTIMATOR_NAMES = {"std": r"$\sqrt{12}$ std", "integral": "integral / maximum", "half_max": "half maximum", "exact_support": "support"}
 QUANTITY_NAMES = {
@@ -154,6 +154,22 @@ def log_y(axis, low, high):
         axis.yaxis.set_minor_locator(NullLocator())
     else:
         axis.yaxis.set_minor_formatter(NullFormatter())
+
+def rails(axis, lost, style, text):
+    """Runs without a number above the axes, one row per series: hollow marker and a cross."""
+    transform = axis.get_xaxis_transform()
+    height = axis.get_position().height * axis.figure.get_figheight()
+    for row, (label, where) in enumerate(lost.items()):
+        y = 1.0 + (0.08 + 0.12 * row) / height
+        axis.plot([0, 1], [y, y], transform=axis.transAxes, color="0.85", linewidth=0.6, clip_on=False, zorder=1)
+        axis.plot(where, [y] * len(where), transform=transform, linestyle="none", marker=style.marker(label),
+                  markersize=5.5, markerfacecolor="white", markeredgecolor=style.colour(label), clip_on=False)
+        axis.plot(where, [y] * len(where), transform=transform, linestyle="none", marker="x", markersize=3,
+                  color=style.colour(label), clip_on=False)
+        if row == 0:
+            axis.annotate(text, (0, y), xycoords="axes fraction", xytext=(-3, 0), textcoords="offset points",
+                          fontsize=6.5, color=RAIL, ha="right", va="center", annotation_clip=False)
+
 
 def axis_scale(values, unit):
     finite = np.concatenate([np.ravel(v) for v in values])

@@ -12,9 +12,10 @@ from . import components, metrics
 from .components import of_snapshot
 from .convergence import fit_order
 from .curves import curve, history
-from .drawing import (QUANTITY_NAMES, Drawing, FigureError, axis_scale, by_series, chosen, label_of, log_y, name_of, one_size, short,
+from .drawing import (QUANTITY_NAMES, Drawing, FigureError, axis_scale, by_series, chosen, label_of, log_y, name_of, one_size, rails, short,
                       sizes_axis, snapshot_of, where_of_title, with_result, with_unit)
 from .maps import field_maps
+from .power_law import power_law
 from .results import ResultError
 from .style import EXACT, RAIL, WIDTH, frame, legend_below, legend_shape
 from .targets import number
@@ -36,22 +37,6 @@ def _triangle(axis, orders, points, x_low, x_high):
         axis.annotate(f"{order:g}", (right, end), xytext=(2.5, 0), textcoords="offset points", fontsize=6.5,
                       color="0.25", va="center", annotation_clip=False)
     return bottom
-
-
-def _rails(axis, lost, style, text):
-    """Runs without a number above the axes, one row per series: hollow marker and a cross."""
-    transform = axis.get_xaxis_transform()
-    height = axis.get_position().height * axis.figure.get_figheight()
-    for row, (label, where) in enumerate(lost.items()):
-        y = 1.0 + (0.08 + 0.12 * row) / height
-        axis.plot([0, 1], [y, y], transform=axis.transAxes, color="0.85", linewidth=0.6, clip_on=False, zorder=1)
-        axis.plot(where, [y] * len(where), transform=transform, linestyle="none", marker=style.marker(label),
-                  markersize=5.5, markerfacecolor="white", markeredgecolor=style.colour(label), clip_on=False)
-        axis.plot(where, [y] * len(where), transform=transform, linestyle="none", marker="x", markersize=3,
-                  color=style.colour(label), clip_on=False)
-        if row == 0:
-            axis.annotate(text, (0, y), xycoords="axes fraction", xytext=(-3, 0), textcoords="offset points",
-                          fontsize=6.5, color=RAIL, ha="right", va="center", annotation_clip=False)
 
 
 def _gather(runs, quantity, norm, x):
@@ -153,7 +138,7 @@ def convergence(study, entry, style):
     sizes_axis(axis.xaxis, everything)
     axis.set_xlabel(X_NAMES.get(x, x))
     axis.set_ylabel(name_of(quantity, norm))
-    _rails(axis, failing, style, "failed")
+    rails(axis, failing, style, "failed")
     legend_below(figure, handles, columns)
     if any(math.isfinite(f.order) for f in fits.values()):
         notes.append("Orders are log-log least squares with their 95 % interval")
@@ -217,7 +202,7 @@ def work_precision(study, entry, style):
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_xlabel("Solve time [s]")
     axis.set_ylabel(name_of(quantity, norm))
-    _rails(axis, failing, style, "failed")
+    rails(axis, failing, style, "failed")
     legend_below(figure, handles, columns)
     if exact:
         notes.append("Methods that are exact to rounding stand on the lower edge")
@@ -375,7 +360,7 @@ def bars(study, entry, style):
     return Drawing(figure, runs, notes)
 
 
-KINDS = {"convergence": convergence, "work_precision": work_precision, "profile": profile, "field": field_maps,
+KINDS = {"convergence": convergence, "power_law": power_law, "work_precision": work_precision, "profile": profile, "field": field_maps,
          "history": history, "curve": curve, "bars": bars}
 
 

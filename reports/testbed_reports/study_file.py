@@ -25,13 +25,15 @@ TARGET_KEYS = {"label": TEXT, "quantity": TEXT, "norm": TEXT, "where": TABLE, "k
                "low": NUMBER, "high": NUMBER, "L_from": NUMBER, "L_to": NUMBER, "source": TEXT}
 # kind -> keys that it needs
 TARGET_KINDS = {"value_max": ("value",), "value_min": ("value",), "value_between": ("low", "high"),
-                "order_min": ("value",), "order_between": ("low", "high"), "not_converging": ()}
+                "order_min": ("value",), "order_between": ("low", "high"), "not_converging": (),
+                "exponent_max": ("value",), "exponent_between": ("low", "high")}
 
 FIGURE_KEYS = {"kind": TEXT, "name": TEXT, "title": TEXT, "caption": TEXT, "where": TABLE, "width": TEXT,
                "series": TEXT + LIST}
 # kind -> (keys that it needs, further keys)
 FIGURE_KINDS = {
     "convergence": ({"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "orders": LIST, "L_from": NUMBER, "L_to": NUMBER}),
+    "power_law": ({"quantity": TEXT}, {"norm": TEXT, "L_from": NUMBER, "L_to": NUMBER}),
     "work_precision": ({"quantity": TEXT}, {"norm": TEXT}),
     "profile": ({"component": TEXT}, {"along": TEXT, "panels": TEXT, "L": NUMBER + LIST, "band": LIST,
                                       "snapshot": (int,)}),

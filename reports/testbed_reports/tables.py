@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from . import metrics
-from .convergence import fit_order, pairwise_orders
+from .convergence import fit_order, fit_power, pairwise_orders
 from .dataset import groups
-from .targets import digits_of, mean_by_size, number
+from .targets import digits_of, mean_by_size, number, values_by_size
 
 
 @dataclass
@@ -120,6 +120,24 @@ def convergence_table(study, quantity, norm):
     return Table(f"{quantity}_{norm}".strip("_"), title, header, rows, notes=notes)
 
 
+def power_law_table(study, quantity):
+    """a and q of quantity = a L^q with their 95 % intervals, fitted to every run: rows are variants and norms. None without a fit."""
+    norms, rows = [norm for name, norm in pairs(study) if name == quantity], []
+    for label, runs in groups(study.runs).items():
+        for norm in norms:
+            law = fit_power(*values_by_size(runs, quantity, norm))
+            if math.isfinite(law.q.order):
+                rows.append([label, norm, f"{law.q.order:.3f}", _interval(law.q.low, law.q.high, "{:.3f}".format), number(law.a, 4),
+                             _interval(law.a_low, law.a_high, lambda v: number(v, 4)), str(law.q.points)])
+    words = quantity.replace("_", " ")
+    return Table(f"power_law_{quantity}", f"{words} = a L^q", ["variant", "norm", "q", "95 % of q", "a", "95 % of a", "runs"], rows, 2,
+                 ["Least squares of the logarithms over all runs; a is the value at L = 1 m."]) if rows else None
+
+
+def _interval(low, high, text):
+    return f"[{text(low)}, {text(high)}]" if math.isfinite(low) else ""
+
+
 def values_tables(study):
     """Every number of studies with one cell size, a table for each case: rows are variants, columns quantities."""
     tables = []
@@ -185,5 +203,7 @@ def study_tables(study):
     tables = [t for t in found if t]
     if not tables:
         tables = values_tables(study)
-    performance = performance_table(study)
-    return tables + ([performance] if performance else [])
+    asked = [entry["quantity"] for entry in study.spec.figures if entry["kind"] == "power_law"]
+    asked += [target["quantity"] for target in study.spec.targets if target["kind"].startswith("exponent")]
+    tables += [power_law_table(study, quantity) for quantity in dict.fromkeys(asked)] + [performance_table(study)]
+    return [table for table in tables if table]

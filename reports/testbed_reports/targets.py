@@ -51,6 +51,8 @@ def asked(target):
     text = {"value_max": lambda: f"{what} ≤ {target['value']:g}",
             "value_min": lambda: f"{what} ≥ {target['value']:g}",
             "value_between": lambda: f"{target['low']:g} ≤ {what} ≤ {target['high']:g}",
+            "exponent_max": lambda: f"exponent of {what} ≤ {target['value']:g}",
+            "exponent_between": lambda: f"{target['low']:g} ≤ exponent of {what} ≤ {target['high']:g}",
             "order_min": lambda: f"order of {what} ≥ {target['value']:g}",
             "order_between": lambda: f"{target['low']:g} ≤ order of {what} ≤ {target['high']:g}",
             "not_converging": lambda: f"order of {what} < {NOT_CONVERGING_ORDER} on the finer half of L"}[kind]()
@@ -84,6 +86,13 @@ def mean_by_size(runs, quantity, norm):
     sizes = sorted(s for s in by_size if isinstance(s, (int, float)))
     means = [float(np.mean(by_size[s])) if by_size[s] else math.nan for s in sizes]
     return np.array(sizes, float), np.array(means, float), lost
+
+
+def values_by_size(runs, quantity, norm):
+    """(L (K,), metric (K,)): one pair for each run that gave a number."""
+    pairs = [(run.values.get("L"), run.value(quantity, norm)) for run in runs]
+    pairs = [(size, value) for size, value in pairs if isinstance(size, (int, float)) and math.isfinite(value)]
+    return np.array(pairs, float).reshape(-1, 2).T
 
 
 def _told(run):
@@ -139,9 +148,11 @@ def _judge_order(target, runs, quantity, norm):
             fit = fit_order(sizes[keep], means[keep])
             verdicts.append("pass" if fit.order < NOT_CONVERGING_ORDER else "fail")
         else:
-            fit = fit_order(sizes, means)
-            low = target.get("low", target.get("value", -math.inf))
-            high = target.get("high", math.inf)
+            exponent = target["kind"].startswith("exponent")  # of every run, not of means
+            fit = fit_order(*(values_by_size(own, quantity, norm) if exponent else (sizes, means)))
+            at_most = target["kind"] == "exponent_max"
+            low = target.get("low", -math.inf if at_most else target.get("value", -math.inf))
+            high = target.get("high", target["value"] if at_most else math.inf)
             verdicts.append("pass" if low <= fit.order <= high and not lost else "fail")
             if lost:
                 notes.append("no number: " + ", ".join(_why(r, quantity, norm) for r in lost))
@@ -164,7 +175,7 @@ def judge(target, study):
         if left_out:
             return Verdict(**base, measured="n/a", verdict="not run", note=left_out[0].get("reason", "left out"))
         return Verdict(**base, measured="n/a", verdict="fail", note="no run")
-    order = target["kind"].startswith("order") or target["kind"] == "not_converging"
+    order = target["kind"].startswith(("order", "exponent")) or target["kind"] == "not_converging"
     measured, verdict, note = (_judge_order if order else _judge_value)(target, runs, quantity, norm)
     ratios = [run.value("static", "kinetic_over_strain") for run in runs]
     ratios = [r for r in ratios if math.isfinite(r)]

@@ -1,5 +1,6 @@
 """Reports from synthetic studies: what is shown, that it stands alone, and that nothing bad breaks it."""
 import csv
+import math
 import re
 import shutil
 import subprocess
@@ -9,8 +10,10 @@ import pytest
 from conftest import REPORTS
 from synthetic import write_result, write_study
 from testbed_reports.dataset import read_study_folder
+from testbed_reports.figures import draw
 from testbed_reports.report import build
-from testbed_reports.tables import Table, as_latex, convergence_table, escape, performance_table
+from testbed_reports.style import Style
+from testbed_reports.tables import Table, as_latex, convergence_table, escape, performance_table, power_law_table, study_tables
 
 EXTRA = """
 [[target]]
@@ -155,6 +158,26 @@ def test_performance_medians(tmp_path):
     assert row["solve [s]"] == "2.00 [1.00–5.00]" and row["memory [B/point]"] == "200"
 
 
+def test_power_law_of_all_seeds(tmp_path):
+    """w = 1.2 L^0.5 but for a factor of e^(+-0.1) by seed."""
+    figure = '[[figure]]\nkind = "power_law"\nquantity = "stress"\nnorm = "l2"\n'
+    folder = write_study(tmp_path / "p", figure, sizes=(0.5, 0.25, 0.125), metrics="stress", repeats=2,
+                         models={"lpfdm": lambda L: 1.0, "mpm-linear": lambda L: 1.0},
+                         change=lambda v, L, r: None if (v, L) == ("mpm-linear", 0.5) else {
+                             "stress_error": 1.2 * L**0.5 * math.exp(0.1 if r == 1 else -0.1), "seed": r})
+    study = read_study_folder(folder)
+    rows = {(row[0], row[1]): row for row in power_law_table(study, "stress").rows}
+    assert rows["lpfdm", "l2"][2] == "0.500" and rows["lpfdm", "l2"][4] == "1.200" and rows["lpfdm", "l2"][6] == "6"
+    assert rows["mpm-linear", "l2"][6] == "4" and ("lpfdm", "linf") in rows
+    assert [t.name for t in study_tables(study)].count("power_law_stress") == 1
+    drawing = draw(study, study.spec.figures[0], Style(study.variants()))
+    dots, means, line = drawing.figure.axes[0].lines[:3]
+    assert len(dots.get_xdata()) == 6 and list(means.get_xdata()) == [0.125, 0.25, 0.5]
+    assert list(means.get_ydata()) == pytest.approx([1.2 * L**0.5 * math.cosh(0.1) for L in means.get_xdata()])
+    assert list(line.get_ydata()) == pytest.approx([1.2 * 0.125**0.5, 1.2 * 0.5**0.5])
+    assert any("mpm-linear gave no number at L = 0.5 m" in note for note in drawing.notes)
+
+
 def test_latex(report):
     files = list((report / "tables").glob("*.tex"))
     assert len(files) == len(list((report / "tables").glob("*.csv"))) > 5
@@ -182,7 +205,6 @@ def test_escape():
 
 
 def test_same_variant_same_look():
-    from testbed_reports.style import Style
     style = Style(["mpm-b", "lpfdm", "fem-q2", "mpm-a", "lpfdm-2000"])
     looks = [str(style.of(v)) for v in ("lpfdm", "lpfdm-2000", "mpm-a", "mpm-b", "fem-q2")]
     assert len(set(looks)) == 5 and str(style.of("lpfdm")) == looks[0]

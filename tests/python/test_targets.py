@@ -34,6 +34,11 @@ AT = {"variant": "lpfdm", "L": 0.5}  # error 0.005
     ("order_between", None, {"low": 1.0, "high": 1.9}, "fail"),
     ("order_between", None, {"low": 2.1, "high": 3.0}, "fail"),
     ("not_converging", {"variant": "mpm-linear"}, {}, "pass"), ("not_converging", None, {}, "fail"),
+    ("exponent_max", None, {"value": 2.1}, "pass"), ("exponent_max", None, {"value": 1.9}, "fail"),
+    ("exponent_between", None, {"low": 1.9, "high": 2.1}, "pass"), ("exponent_between", None, {"low": 2.1, "high": 3.0}, "fail"),
+    ("exponent_between", None, {"low": 1.0, "high": 1.9}, "fail"), ("exponent_max", {"variant": "mpm-linear"}, {"value": -0.9}, "pass"),
+    ("exponent_max", {"variant": "mpm-cpgimp"}, {"value": 9.0}, "fail"),  # a lost run
+    ("exponent_max", {"variant": "lpfdm", "L": 0.5}, {"value": 9.0}, "fail"),  # one cell size
     # several runs: all must satisfy it
     ("value_max", {"variant": "lpfdm"}, {"value": 0.05}, "fail"), ("value_max", {"variant": "lpfdm"}, {"value": 0.1}, "pass"),
     # a diverged run gives no number
@@ -76,3 +81,12 @@ def test_method_means_family_or_variant(study):
                                          (0.0, "0"), (float("nan"), "n/a"), (4567.0, "4570")])
 def test_three_digits(value, text):
     assert number(value) == text
+
+
+def test_an_exponent_is_fitted_to_every_run_not_to_means(tmp_path):
+    """Seeds 1 and e^2 times apart at one size: the mean of the logarithms is not the logarithm of the mean."""
+    factor = {(1.0, 1): 1.0, (1.0, 2): 7.38905609893065, (2.0, 1): 2.0, (2.0, 2): 2.0}
+    folder = write_study(tmp_path / "p", repeats=2, metrics="stress", models={"lpfdm": lambda L: 1.0}, sizes=(2.0, 1.0),
+                         change=lambda v, L, r: {"stress_error": 0.01 * factor[L, r], "seed": r})
+    measured = verdict(read_study_folder(folder), "exponent_max", value=9.0).measured
+    assert measured.startswith(f"{1.0 - 1.0 / 0.6931471805599453:.2f} [")
