@@ -1,4 +1,4 @@
-"""The self-contained page: template, inline figures, inline style."""
+"""The self-contained pages: templates, inline figures, inline style."""
 import base64
 import io
 from pathlib import Path
@@ -13,8 +13,8 @@ def inline_svg(figure):
     return "data:image/svg+xml;base64," + base64.b64encode(out.getvalue()).decode()
 
 
-def render(**content):
-    """The page as text."""
+def render(template, **content):
+    """A page as text."""
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True,
                                      trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
-    return environment.get_template("template.html").render(**content)
+    return environment.get_template(template).render(**content)

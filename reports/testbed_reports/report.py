@@ -1,4 +1,4 @@
-"""`testbed report`: one page, figures for print, tables for print, from the folders of studies."""
+"""`testbed report`: pages, figures for print, tables for print, from the folders of studies."""
 import argparse
 import os
 import re
@@ -98,7 +98,8 @@ def _study_section(study, style, out, command, failures):
         name = f"{slug(study.name)}_{name}" + (f"_{used[name]}" if used[name] > 1 else "")
         title = entry.get("title") or f"{entry['kind']}: {what} {entry.get('norm', '')}".replace("_", " ").strip()
         title = title[:1].upper() + title[1:]
-        shown = {"title": title, "image": "", "caption": "", "error": "", "width": "column"}
+        shown = {"title": title, "image": "", "caption": "", "error": "", "width": "column", "anchor": f"figure-{name}",
+                 "paper": entry.get("paper", "").strip(), "shows": entry.get("shows", "").strip()}
         try:
             with plt.rc_context(RC):
                 drawing = draw(study, entry, style)
@@ -120,6 +121,17 @@ def _study_section(study, style, out, command, failures):
         summary += f" {len(study.left_out)} combinations left out."
     return {"anchor": f"study-{slug(study.name)}", "title": study.spec.title, "purpose": study.spec.purpose,
             "summary": summary, "figures": figures, "tables": tables}
+
+
+def _write_gallery(out, title, sections):
+    """Writes gallery.html of the figures with words of a paper or of the study's author; False when there are none."""
+    shown = [section | {"figures": [f for f in section["figures"] if f["paper"] or f["shows"]]} for section in sections]
+    shown = [section for section in shown if section["figures"]]
+    if shown:
+        write_atomically(out / "gallery.html", render("gallery.html", title=title, studies=shown))
+    else:
+        (out / "gallery.html").unlink(missing_ok=True)  # of an earlier report
+    return bool(shown)
 
 
 def build(folders, out, command):
@@ -153,7 +165,9 @@ def build(folders, out, command):
     left_out = [[s.name, e.get("variant") or "", ", ".join(f"{k} = {v}" for k, v in e.get("axes", {}).items()),
                  e.get("reason", "")] for s in studies for e in s.left_out]
     titles = [s.spec.title for s in studies]
-    page = render(title=titles[0] if len(titles) == 1 else "Testbed report", provenance=rows, warnings=warnings,
+    title = titles[0] if len(titles) == 1 else "Testbed report"
+    gallery = _write_gallery(out, title, sections)
+    page = render("template.html", title=title, gallery=gallery, provenance=rows, warnings=warnings,
                   studies=sections, verdicts=flat,
                   counts=", ".join(f"{counted[k]} {k}" for k in ("pass", "fail", "not run") if counted[k]) + ".",
                   failures=Table("failures", "Failures", ["study", "what", "status", "reason"], failures, 4),

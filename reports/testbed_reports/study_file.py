@@ -29,7 +29,7 @@ TARGET_KINDS = {"value_max": ("value",), "value_min": ("value",), "value_between
                 "exponent_max": ("value",), "exponent_between": ("low", "high")}
 
 FIGURE_KEYS = {"kind": TEXT, "name": TEXT, "title": TEXT, "caption": TEXT, "where": TABLE, "width": TEXT,
-               "series": TEXT + LIST}
+               "series": TEXT + LIST, "paper": TEXT, "shows": TEXT}
 # kind -> (keys that it needs, further keys)
 FIGURE_KINDS = {
     "convergence": ({"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "orders": LIST, "L_from": NUMBER, "L_to": NUMBER}),

@@ -36,6 +36,8 @@ kind = "convergence"
 quantity = "stress"
 norm = "l2"
 orders = [1, 2]
+paper = "Errors fall with the <second> power of L & no faster."
+shows = "The order is two."
 [[figure]]
 kind = "work_precision"
 quantity = "displacement"
@@ -61,7 +63,11 @@ quantity = "particle_steps_per_second"
 [[figure]]
 kind = "bars"
 quantity = "nothing"
+paper = "Nothing comes of nothing."
 """
+
+
+PAGES = [("report.html", 7), ("gallery.html", 1)]  # and their pictures
 
 
 def change(variant, L, repeat):
@@ -104,20 +110,52 @@ def test_figures_for_print(report):
     assert len(names) == 7 and all((report / "figures" / n).read_bytes().startswith(b"%PDF") for n in names)
 
 
-def test_page_stands_alone(page):
+class Balance(HTMLParser):
+    """Every tag is closed in order."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.stack = []
+        self.feed(text)
+        assert self.stack == []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in ("meta", "link", "img", "br"):
+            self.stack.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.stack.pop() == tag
+
+
+@pytest.mark.parametrize("name, pictures", PAGES)
+def test_pages_stand_alone(report, name, pictures):
+    page = (report / name).read_text()
     rest = re.sub(r"data:[^\"']*", "", page)
     assert not re.search(r"https?://|file://|<script|<link(?![^>]*href=\"\")|@import|url\(", rest)
-    assert len(re.findall(r'<img src="data:image/svg\+xml;base64,', page)) == 7
-    class Balance(HTMLParser):
-        stack = []
-        def handle_starttag(self, tag, attributes):
-            if tag not in ("meta", "link", "img", "br"):
-                self.stack.append(tag)
-        def handle_endtag(self, tag):
-            assert self.stack.pop() == tag
-    parser = Balance()
-    parser.feed(page)
-    assert parser.stack == []
+    assert len(re.findall(r'<img src="data:image/svg\+xml;base64,', page)) == pictures
+    Balance(page)
+
+
+def test_gallery_sets_words_beside_pictures(report, page):
+    gallery = (report / "gallery.html").read_text()
+    text = text_of(gallery)
+    assert "The paper Errors fall with the &lt;second&gt; power of L &amp; no faster." in text
+    assert "The order is two." in text and text.index("Errors fall") < text.index("The order is two.")
+    assert "Not drawn" in text and "Nothing comes of nothing." in text  # a figure that failed is not hidden
+    assert "Displacement" not in text and gallery.count('class="pair"') == 2  # figures without words stay in the report
+    assert 'href="gallery.html"' in page and 'href="report.html"' in gallery
+    for anchor in re.findall(r'href="report\.html#([^"]+)"', gallery):
+        assert f'id="{anchor}"' in page
+
+
+def test_no_words_no_gallery(tmp_path):
+    folder = write_study(tmp_path / "s", EXTRA, sizes=(1.0,), metrics="stress")
+    out = build([folder], tmp_path / "out", "testbed report s").parent
+    assert (out / "gallery.html").exists()
+    study = folder / "study.toml"
+    study.write_text(re.sub(r"^(paper|shows) = .*\n", "", study.read_text(), flags=re.M))
+    page = build([folder], out, "testbed report s").read_text()
+    assert not (out / "gallery.html").exists() and "gallery.html" not in page
 
 
 def test_page_says_what_failed(page):
@@ -233,19 +271,20 @@ def test_command(tmp_path):
 
 
 @pytest.mark.skipif(not shutil.which("chromium"), reason="chromium is not installed")
-def test_in_a_browser(report, tmp_path):
+@pytest.mark.parametrize("name, pictures", PAGES)
+def test_in_a_browser(report, tmp_path, name, pictures):
     """Every picture loads with a size, and the console stays silent. The probe is added to a copy of the page."""
     probe = """<script>addEventListener('load', () => { document.title = 'IMAGES ' +
       [...document.images].map(i => i.naturalWidth > 0 && i.naturalHeight > 0 && i.clientWidth > 100).join(' ') +
       ' WIDE ' + (document.documentElement.scrollWidth <= innerWidth); });</script>"""
     copy = tmp_path / "copy.html"
-    copy.write_text((report / "report.html").read_text().replace("</body>", probe + "</body>"))
+    copy.write_text((report / name).read_text().replace("</body>", probe + "</body>"))
     options = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0",
                f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1200,1000"]
     done = subprocess.run([*options, "--dump-dom", copy.as_uri()], capture_output=True, text=True, timeout=50)
     title = re.search(r"<title>(.*?)</title>", done.stdout).group(1)
-    assert title == "IMAGES " + " ".join(["true"] * 7) + " WIDE true", title
+    assert title == "IMAGES " + " ".join(["true"] * pictures) + " WIDE true", title
     assert "CONSOLE" not in done.stderr
     picture = tmp_path / "page.png"
-    subprocess.run([*options, f"--screenshot={picture}", (report / "report.html").as_uri()], capture_output=True, timeout=50)
+    subprocess.run([*options, f"--screenshot={picture}", (report / name).as_uri()], capture_output=True, timeout=50)
     assert picture.stat().st_size > 20000
