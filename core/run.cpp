@@ -140,6 +140,19 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
     return out;
 }
 
+/// Share of the random strengths of a material that were truncated, over its bodies by their points.
+double truncated_share(const Scene& scene, const Solver& solver, const MaterialSpec& material)
+{
+    double truncated = 0, points = 0;
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+        if (const Body& body = solver.bodies()[b]; scene.bodies[b].material == material.name)
+        {
+            truncated += body.truncated_share * static_cast<double>(body.points.count);
+            points += static_cast<double>(body.points.count);
+        }
+    return points > 0 ? truncated / points : 0;
+}
+
 void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
 {
     file.attribute("/", "format", std::string("testbed-result"));
@@ -175,6 +188,15 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
         file.attribute(group, "youngs_modulus", moduli.youngs_modulus());
         file.attribute(group, "poissons_ratio", moduli.poissons_ratio());
         file.attribute(group, "constrained_modulus", moduli.constrained());
+        if (!m.has_strength())
+            continue;
+        const Constants constants = scene.expression_constants();
+        const Place origin{};
+        file.attribute(group, "cohesion", Expression(m.strength->cohesion, constants)(origin));  // of the mean, where it is a number
+        file.attribute(group, "friction_angle", Expression(m.strength->friction_angle, constants)(origin));
+        file.attribute(group, "dilatancy_angle", m.strength->dilatancy_angle);
+        if (m.random)
+            file.attribute(group, "truncated_share", truncated_share(scene, solver, m));
     }
 }
 
@@ -311,6 +333,11 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
     file.commit();
     write_text(std::filesystem::path(output).replace_extension(".xdmf"), observer.xdmf(std::filesystem::path(output).filename().string()));
 
+    if (!options.quiet)
+        for (const MaterialSpec& m : scene.materials)
+            if (m.random)
+                fmt::print(stderr, "material '{}': {:.3g} % of the random strengths were truncated\n", m.name,
+                           100 * truncated_share(scene, *solver, m));
     if (!options.quiet)
         fmt::print(stderr,
                    "{} {}: {}{}{}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.1f} bytes per "

@@ -1,5 +1,7 @@
+#include "core/geometry.hpp"
 #include "core/method_limits.hpp"
 #include "core/scene_problems.hpp"
+#include "core/walls.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -65,7 +67,7 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
             for (std::size_t k = 0; k < 2 && grid.cell_size > 0; ++k)
                 if (high[k] <= low[k])
                     problems.add(key + ".max", "must lie above and to the right of min");
-                else if (!is_multiple(high[k] - low[k], grid.cell_size))
+                else if (body.inside.empty() && !is_multiple(high[k] - low[k], grid.cell_size))
                     problems.add(key + ".max", fmt::format("the extent {} m in {} is not a multiple of the cell size {} m",
                                                            high[k] - low[k], "xy"[k], grid.cell_size));
         }
@@ -123,13 +125,203 @@ void check_overlap(const Scene& scene, Problems& problems)
         for (std::size_t other = 0; other < k; ++other)
         {
             const BodySpec &a = scene.bodies[other], &b = scene.bodies[k];
-            if (!a.min || !a.max || !b.min || !b.max)
+            if (!a.min || !a.max || !b.min || !b.max || a.inside == b.name || b.inside == a.name)
                 continue;
             bool overlap = true;
             for (std::size_t d = 0; d < 2; ++d)
                 overlap &= (*a.min)[d] < (*b.max)[d] - slack && (*b.min)[d] < (*a.max)[d] - slack;
             if (overlap)
                 problems.add(fmt::format("body[{}]", k), fmt::format("body '{}' overlaps body '{}'", b.name, a.name));
+        }
+}
+
+/// An inclusion takes points of another body: all of its shape must lie there.
+void check_inclusion(const Scene& scene, const BodySpec& body, const std::string& key, Problems& problems)
+{
+    std::vector<std::string> names;
+    for (const BodySpec& other : scene.bodies)
+        if (other.name != body.name && other.inside.empty())
+            names.push_back(other.name);
+    if (std::find(names.begin(), names.end(), body.inside) == names.end())
+        return problems.add(key + ".inside", fmt::format("no body '{}' that could hold an inclusion", body.inside) +
+                                                 (names.empty() ? "" : suggestion(body.inside, names)));
+    const BodySpec& host = scene.body(body.inside);
+    for (const Vec2& corner : outline(body))
+        if (!contains(host, corner, 1e-6 * scene.grid.cell_size))
+            return problems.add(key, fmt::format("inclusion '{}' reaches ({}, {}) m, outside body '{}'", body.name, corner[0], corner[1],
+                                                 host.name));
+}
+
+/// A number is checked here; an expression when it is evaluated at the points.
+template <class IsValid>
+void check_number(const std::string& text, const std::string& key, IsValid&& is_valid, const std::string& rule, Problems& problems)
+{
+    if (text.empty() || !is_number(text))
+        return;
+    if (const double value = std::strtod(text.c_str(), nullptr); !is_valid(value))
+        problems.add(key, fmt::format("{}, not {}", rule, value));
+}
+
+void check_strength(const MaterialSpec& m, const std::string& key, Problems& problems)
+{
+    const auto refuse = [&](bool present, const char* name)
+    {
+        if (present)
+            problems.add(key + "." + name, fmt::format("not used by law '{}'", m.law));
+    };
+    if (!m.has_strength())
+    {
+        refuse(m.strength.has_value(), "strength");
+        refuse(m.softening.has_value(), "softening");
+        refuse(m.random.has_value(), "random");
+        return;
+    }
+    if (!m.strength)
+        return problems.add(key + ".strength", fmt::format("missing, law '{}' needs it", m.law));
+    if (!is_number(m.youngs_modulus))
+        problems.add(key + ".youngs_modulus", fmt::format("law '{}' takes a plain number, not an expression", m.law));
+    const std::string angle_rule = "an angle in radians, from 0 to below pi/2, is asked (degrees: \"28.6*pi/180\")";
+    const double right_angle = 0.5 * std::numbers::pi;
+    check_number(
+        m.strength->cohesion, key + ".strength.cohesion", [](double c) { return c >= 0; }, "must not be negative", problems);
+    check_number(
+        m.strength->friction_angle, key + ".strength.friction_angle", [&](double phi) { return phi >= 0 && phi < right_angle; },
+        angle_rule, problems);
+    const double psi = m.strength->dilatancy_angle;
+    if (!(psi >= 0 && psi < right_angle))
+        problems.add(key + ".strength.dilatancy_angle", fmt::format("{}, not {}", angle_rule, psi));
+    else
+        check_number(
+            m.strength->friction_angle, key + ".strength.friction_angle", [&](double phi) { return phi >= psi; },
+            "must not be below the dilatancy angle", problems);
+    if (m.strength->tensile_strength && *m.strength->tensile_strength < 0)
+        problems.add(key + ".strength.tensile_strength", "must not be negative");
+
+    const auto positive = [&](const std::optional<double>& value, const std::string& name)
+    {
+        if (value && !(*value > 0))
+            problems.add(key + name, fmt::format("must be positive, not {}", *value));
+    };
+    if (m.softening)
+    {
+        const SofteningSpec& s = *m.softening;
+        const bool linear = s.kind == "linear";
+        if (!(s.residual >= 0 && s.residual <= 1))
+            problems.add(key + ".softening.residual", fmt::format("a share in [0, 1] is asked, not {}", s.residual));
+        if (linear && !s.strain)
+            problems.add(key + ".softening.strain", "missing, kind = \"linear\" needs it");
+        const auto only_linear = [&](bool present, const char* name)
+        {
+            if (present && !linear)
+                problems.add(key + ".softening." + name, "only for kind = \"linear\"");
+        };
+        only_linear(s.strain.has_value(), "strain");
+        only_linear(s.band_thickness.has_value(), "band_thickness");
+        only_linear(s.nonlocal.has_value(), "nonlocal");
+        positive(s.strain, ".softening.strain");
+        positive(s.band_thickness, ".softening.band_thickness");
+        if (s.band_thickness && s.nonlocal)
+            problems.add(key + ".softening.band_thickness", "crack-band scaling and nonlocal softening exclude each other");
+        if (s.nonlocal)
+        {
+            positive(s.nonlocal->internal_length, ".softening.nonlocal.internal_length");
+            if (!(s.nonlocal->over_nonlocal >= 1))
+                problems.add(key + ".softening.nonlocal.over_nonlocal",
+                             fmt::format("must be at least 1 (nonlocal), above 1 to regularise; not {}", s.nonlocal->over_nonlocal));
+        }
+    }
+    if (m.random)
+    {
+        const RandomSpec& r = *m.random;
+        if (r.seed < 0)
+            problems.add(key + ".random.seed", "must not be negative");
+        for (const auto& [value, name] : {std::pair{r.cohesion_deviation, "cohesion_deviation"}, {r.friction_deviation, "friction_deviation"}})
+            if (!(value >= 0 && value <= 2))
+                problems.add(key + ".random." + name, fmt::format("a relative deviation in [0, 2] is asked, not {}", value));
+        positive(r.correlation_length, ".random.correlation_length");
+        if ((r.field == "correlated") != r.correlation_length.has_value())
+            problems.add(key + ".random.correlation_length", r.correlation_length ? "only for field = \"correlated\""
+                                                                                  : "missing, field = \"correlated\" needs it");
+    }
+}
+
+void check_wall(const Scene& scene, const WallSpec& wall, const std::string& key, Problems& problems)
+{
+    const GridSpec& grid = scene.grid;
+    const double slack = 1e-6 * grid.cell_size;
+    const auto outside = [&](const Vec2& min, const Vec2& max)
+    {
+        bool out = false;
+        for (std::size_t k = 0; k < 2; ++k)
+            out |= min[k] < grid.origin[k] - slack || max[k] > grid.origin[k] + grid.size[k] + slack;
+        return out;
+    };
+    if (wall.max[0] < wall.min[0] || wall.max[1] < wall.min[1] || (wall.max[0] == wall.min[0] && wall.max[1] == wall.min[1]))
+        return problems.add(key + ".max", "must lie above or to the right of min");
+    if (outside(wall.min, wall.max))
+        return problems.add(key, fmt::format("wall '{}' spans ({}, {}) .. ({}, {}) m, outside the lattice", wall.name, wall.min[0],
+                                             wall.min[1], wall.max[0], wall.max[1]));
+    for (std::size_t k = 0; k < 2 && wall.motion == "hand_off"; ++k)
+        for (const double face : {wall.min[k], wall.max[k]})
+            if (const double cells = (face - grid.origin[k]) / grid.cell_size; std::abs(cells - std::round(cells)) > 1e-6)
+                return problems.add(key, fmt::format("the face of wall '{}' at {} = {} m lies between lines of nodes; move it to a multiple of "
+                                                     "the cell size {} m, or set motion = \"smooth\"",
+                                                     wall.name, "xy"[k], face, grid.cell_size));
+    if (wall.door)
+    {
+        const std::size_t along = door_direction(wall);
+        const auto [from, to] = *wall.door;
+        if (from >= to)
+            problems.add(key + ".door", "an opening [from, to] with from < to is asked");
+        else if (from < wall.min[along] - slack || to > wall.max[along] + slack)
+            problems.add(key + ".door", fmt::format("the door spans {} .. {} m and is wider than its wall, {} .. {} m", from, to,
+                                                    wall.min[along], wall.max[along]));
+        else if (to - from < 2 * grid.cell_size - slack)
+            problems.add(key + ".door", fmt::format("an opening of {} m has no free node: at least two cells, {} m, are asked", to - from,
+                                                    2 * grid.cell_size));
+    }
+    if (wall.door_opens < 0)
+        problems.add(key + ".door_opens", "must not be negative");
+    if (!(scene.time.end > 0))
+        return;
+    try
+    {
+        const auto path = wall_path(wall, scene.expression_constants(), scene.time.end);
+        for (std::size_t n = 0; n < path.size(); ++n)
+            if (const Vec2& u = path[n]; outside({wall.min[0] + u[0], wall.min[1] + u[1]}, {wall.max[0] + u[0], wall.max[1] + u[1]}))
+                return problems.add(key + ".velocity",
+                                    fmt::format("wall '{}' leaves the lattice at t = {:.4g} s, after a travel of ({:.4g}, {:.4g}) m; make the "
+                                                "lattice larger or the travel shorter",
+                                                wall.name, static_cast<double>(n) * scene.time.end / static_cast<double>(path.size() - 1), u[0],
+                                                u[1]));
+    }
+    catch (const ExpressionError& e)
+    {
+        problems.add(key + ".velocity", e.what());
+    }
+}
+
+void check_traction(const Scene& scene, const TractionSpec& traction, const std::string& key, Problems& problems)
+{
+    std::vector<std::string> boxes;
+    for (const BodySpec& body : scene.bodies)
+        if (body.shape == "box" && body.inside.empty())
+            boxes.push_back(body.name);
+    if (std::find(boxes.begin(), boxes.end(), traction.body) == boxes.end())
+        problems.add(key + ".body", fmt::format("no box '{}'", traction.body) + suggestion(traction.body, boxes));
+}
+
+/// Nonlocal softening averages over all bodies together: they must agree on how.
+void check_nonlocal(const Scene& scene, Problems& problems)
+{
+    const NonlocalSpec* first = nullptr;
+    for (std::size_t k = 0; k < scene.materials.size(); ++k)
+        if (const auto& s = scene.materials[k].softening; s && s->nonlocal)
+        {
+            if (!first)
+                first = &*s->nonlocal;
+            else if (s->nonlocal->internal_length != first->internal_length || s->nonlocal->weight != first->weight)
+                problems.add(fmt::format("material[{}].softening.nonlocal", k), "all nonlocal materials share one internal_length and weight");
         }
 }
 }  // namespace
@@ -179,6 +371,9 @@ void check_scene(const Scene& scene, Problems& problems)
                 positive(value, key + ".youngs_modulus");
         }
     }
+    for (std::size_t k = 0; k < scene.materials.size(); ++k)
+        check_strength(scene.materials[k], fmt::format("material[{}]", k), problems);
+    check_nonlocal(scene, problems);
     check_unique_names(scene.materials, "material", problems);
     if (scene.materials.empty())
         problems.add("material", "no [[material]] in the scene");
@@ -187,8 +382,28 @@ void check_scene(const Scene& scene, Problems& problems)
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
         check_body(scene, scene.bodies[k], fmt::format("body[{}]", k), problems);
     check_unique_names(scene.bodies, "body", problems);
+    if (problems.errors().empty())
+        for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+            if (!scene.bodies[k].inside.empty())
+                check_inclusion(scene, scene.bodies[k], fmt::format("body[{}]", k), problems);
     check_overlap(scene, problems);
     check_unique_names(scene.boundaries, "boundary", problems);
+    check_unique_names(scene.walls, "wall", problems);
+    for (std::size_t k = 0; k < scene.walls.size(); ++k)
+    {
+        const std::string key = fmt::format("wall[{}]", k);
+        const auto same = [&](const BoundarySpec& b) { return b.name == scene.walls[k].name; };
+        if (std::any_of(scene.boundaries.begin(), scene.boundaries.end(), same))
+            problems.add(key + ".name", fmt::format("'{}' is the name of a boundary, too", scene.walls[k].name));
+        if (grid.cell_size > 0)
+            check_wall(scene, scene.walls[k], key, problems);
+    }
+    check_unique_names(scene.tractions, "traction", problems);
+    for (std::size_t k = 0; k < scene.tractions.size(); ++k)
+        check_traction(scene, scene.tractions[k], fmt::format("traction[{}]", k), problems);
+    for (std::size_t k = 0; k < scene.report.curves.size(); ++k)
+        if (scene.report.curves[k].x.size() != scene.report.curves[k].y.size() || scene.report.curves[k].x.size() < 2)
+            problems.add(fmt::format("report.curve[{}]", k), "x and y must have the same number of values, at least two");
     check_unique_names(scene.probes, "probe", problems);
     if (scene.output.history < 0)
         problems.add("output.history", "must not be negative");
@@ -215,6 +430,19 @@ void check_limits(const Scene& scene, Problems& problems)
         problems.warn(scene.time.dt ? "time.dt" : "time.cfl",
                       fmt::format("the time step {:.4g} s is above the critical one, {:.4g} s", dt, critical));
     const std::string family = find_variant(scene.method).family;
+    for (std::size_t k = 0; k < scene.materials.size(); ++k)
+    {
+        const MaterialSpec& m = scene.materials[k];
+        if (family == "fem" && m.has_strength())
+            problems.warn(fmt::format("material[{}].law", k), "the FEM reference is elastic: strength is left out");
+        if (m.softening && m.softening->nonlocal && scene.grid.cell_size > 0.5 * m.softening->nonlocal->internal_length)
+            problems.warn(fmt::format("material[{}].softening.nonlocal", k),
+                          fmt::format("the cell size {} m does not resolve the internal length {} m: at most half of it is asked",
+                                      scene.grid.cell_size, m.softening->nonlocal->internal_length));
+        if (m.softening && m.softening->band_thickness && scene.grid.cell_size < *m.softening->band_thickness)
+            problems.warn(fmt::format("material[{}].softening.band_thickness", k),
+                          fmt::format("crack-band scaling needs cells at least as large as the band, {} m", *m.softening->band_thickness));
+    }
     const bool locks = (family == "mpm" && scene.mpm.strain == "four_point") || (family == "fem" && scene.fem.degree == 1);
     for (std::size_t k = 0; k < scene.materials.size() && locks; ++k)
         if (scene.materials[k].poissons_ratio > 0.45)

@@ -80,7 +80,10 @@ public:
         if (!node)
             problems_.add(full(key), fmt::format("missing ({})", doc));
         else
+        {
             read_expression(full(key), *node, value);
+            evaluate_if_constant(value);
+        }
     }
     void named_numbers(const char* key, Constants& values, const char*)
     {
@@ -315,6 +318,19 @@ private:
         catch (const ExpressionError& e)
         {
             problems_.add(path, e.what());
+        }
+    }
+
+    /// An expression of constants alone is a number: what it stands for then needs no field.
+    void evaluate_if_constant(std::string& value) const
+    {
+        try
+        {
+            if (const double number = evaluate_constant(value, constants_); std::isfinite(number))
+                value = fmt::format("{}", number);
+        }
+        catch (const ExpressionError&)  // it depends on the place, or was told before
+        {
         }
     }
 
