@@ -247,3 +247,17 @@ value = 1.0
     done = bench.run("--check")
     told = [line for line in done.stdout.splitlines() if line.startswith("all of the")]
     assert len(told) == 2 and all("fail" in line and "lpfdm-2000" in line for line in told), done.stdout
+
+
+def test_a_seed_is_known_before_the_run(tmp_path, monkeypatch):
+    """A run that is lost keeps its seed, and seeds make no lines of their own."""
+    from testbed_reports import dataset, study
+    from testbed_reports.study_file import read_study
+    bench = Bench(tmp_path)
+    bench.write('title = "A"\nscene = "scene.toml"\n[axes]\n"material.soil.random.seed" = [0, 3]\n')
+    monkeypatch.setattr(study, "resolve", lambda _, c: (
+        str(c.axes), {"material": [{"name": "soil", "random": {"seed": c.axes["material.soil.random.seed"]}}]}))
+    plan, _ = study.expand(read_study(tmp_path / "s.toml"), bench.testbed, bench.out, False, 1)
+    runs = [dataset.read_run(bench.out / entry["id"], entry) for entry in plan["runs"]]
+    assert [run.values["seed"] for run in runs] == [0, 3]
+    assert [len(own) for own in dataset.groups(runs).values()] == [2]
