@@ -200,6 +200,7 @@ def curve(study, entry, style):
     margin = 0.06 / 1.12 * (high - low)  # the margin goes where the curve begins and ends
     axis.set_xlim(low + margin if min(np.nanmin(v) for v in x) >= 0 else low, high)
     axis.set_ylim(*_range(y, fy, [list(levels.values())]))
+    axis.locator_params(axis="x", nbins=5)
     axis.set_xlabel(x_title)
     axis.set_ylabel(y_title)
     legend_below(figure, handles, columns)

@@ -188,7 +188,7 @@ def snapshot_of(run, index):
 
 def with_unit(title, unit):
     """An axis title; a number without a unit has no brackets."""
-    return f"{title} [{unit}]" if unit else title
+    return f"{title} [{unit}]" if unit not in ("", "-") else title
 
 
 def where_of_title(snapshots):

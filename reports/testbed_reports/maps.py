@@ -90,12 +90,19 @@ def _field_layers(rows, entry):
     return layers
 
 
+def _stripe(across, h):
+    """Default width of a stripe: whole points, about a sixth of the narrow side (`across`), without a rest if some number nearby allows."""
+    points = max(1, round(across / h))
+    even = [k for k in range(math.ceil(points / 8), points // 4 + 1) if points % k == 0]
+    return h * (min(even, key=lambda k: abs(points / k - 6)) if even else max(1, round(points / 6)))
+
+
 def _stripes(snapshot, entry):
     """RGB (N, 3): a checker or strata of the initial position."""
     X = snapshot["initial_position"][:, :2]
     h = math.sqrt(np.median(snapshot["initial_volume"]))
     corner, extent = X.min(axis=0) - h / 2, np.ptp(X, axis=0) + h
-    spacing = entry.get("spacing", max(h, h * round(extent.min() / 6 / h)))
+    spacing = entry.get("spacing", _stripe(extent.min(), h))
     index = np.floor((X - corner) / spacing * (1 + 1e-9)).astype(int)
     number = index[:, 1] if entry.get("pattern", "checker") == "strata" else index.sum(axis=1)
     light, dark = (np.array([int(c[k:k + 2], 16) / 255 for k in (1, 3, 5)]) for c in SAND)
@@ -186,12 +193,13 @@ def field_maps(study, entry, style):
     if height > TALLEST:  # tall and narrow bodies
         height, panel = TALLEST, TALLEST / ratio
         spread = (room - columns * panel) / max(1, columns - 1) if columns > 1 else 0
-        gap = min(spread, 1.0)
+        gap = min(spread, 0.45)
     step, lines = height + TOP, bands * len(rows)
     total = lines * len(layers) * step + BOTTOM + 0.02
-    figure = plt.figure(figsize=(width, total))
     longest = max(len(label) for label, _ in series) * 0.07
     edge = left + columns * panel + (columns - 1) * gap + 0.12 + min(max(0.0, (longest - panel) / 2), 0.3)  # of a long title
+    width = min(width, edge + right - 0.12)
+    figure = plt.figure(figsize=(width, total))
     for number, layer in enumerate(layers):
         mapped = None
         for line, row in enumerate(rows):

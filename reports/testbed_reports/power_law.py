@@ -50,7 +50,7 @@ def power_law(study, entry, style):
     sizes_axis(axis.xaxis, everything)
     axis.set_xlabel("Cell size $L$ [m]")
     axis.set_ylabel(name_of(quantity, norm))
-    rails(axis, failing, style, "failed")
+    rails(axis, failing, style, "no number")
     legend_below(figure, handles, columns)
     notes[:0] = ["Lines a L^q: log-log least squares over every run, q with its 95 % interval; dots are runs, markers means"]
     return Drawing(figure, runs, notes)

@@ -13,7 +13,7 @@ from .figures import FigureError, draw, label_of
 from .page import inline_svg, render
 from .results import ResultError
 from .study_file import StudyError
-from .style import RC, Style, plt
+from .style import RC, WIDTH, Style, plt
 from .tables import Table, as_csv, as_latex, study_tables, targets_table
 from .targets import judge_all
 
@@ -98,7 +98,7 @@ def _study_section(study, style, out, command, failures):
         name = f"{slug(study.name)}_{name}" + (f"_{used[name]}" if used[name] > 1 else "")
         title = entry.get("title") or f"{entry['kind']}: {what} {entry.get('norm', '')}".replace("_", " ").strip()
         title = title[:1].upper() + title[1:]
-        shown = {"title": title, "image": "", "caption": "", "error": "", "width": "column", "anchor": f"figure-{name}",
+        shown = {"title": title, "image": "", "caption": "", "error": "", "width": "column", "rem": 0, "anchor": f"figure-{name}",
                  "paper": entry.get("paper", "").strip(), "shows": entry.get("shows", "").strip()}
         try:
             with plt.rc_context(RC):
@@ -106,7 +106,8 @@ def _study_section(study, style, out, command, failures):
                 drawing.figure.savefig(out / "figures" / f"{name}.pdf", dpi=300,
                                        metadata={"CreationDate": None, "Creator": None, "Producer": None})
                 shown["image"] = inline_svg(drawing.figure)
-                shown["width"] = "page" if drawing.figure.get_figwidth() > 5 else "column"
+                inches = drawing.figure.get_figwidth()
+                shown["width"], shown["rem"] = "page" if inches > 1.05 * WIDTH["column"] else "column", round(62 / 7 * inches, 1)
                 shown["caption"] = caption(study, entry, drawing, command)
         except (FigureError, ResultError) as error:
             shown["error"] = str(error)

@@ -11,6 +11,8 @@ FORMAT, VERSION = "testbed-result", 1
 
 # Columns of a symmetric tensor in a file: the order of XDMF's Tensor6.
 TENSOR = {"xx": 0, "xy": 1, "xz": 2, "yy": 3, "yz": 4, "zz": 5}
+# Fields that a solver writes into the first snapshot only.
+CONSTANT = ("cohesion", "friction_angle")
 VECTOR = {"x": 0, "y": 1, "z": 2}
 
 
@@ -39,17 +41,24 @@ class Snapshot:
         self.time, self.step = attributes.get("time"), attributes.get("step")
         self._cache = {}
 
+    def _home(self, field):
+        """Name of the snapshot that holds a field: the first one those that do not change; '' when there is none."""
+        if field in self.fields:
+            return self.name
+        first = self.result.snapshots[0]
+        return first.name if field in CONSTANT and field in first.fields else ""
+
     def __contains__(self, field):
-        return field in self.fields
+        return self._home(field) != ""
 
     def __getitem__(self, field):
         """The field as a float array: (N,), (N, 3) or (N, 6)."""
         if field not in self._cache:
-            self._cache[field] = self.result.dataset(f"snapshots/{self.name}/{field}")
+            self._cache[field] = self.result.dataset(f"snapshots/{self._home(field) or self.name}/{field}")
         return self._cache[field]
 
     def unit(self, field):
-        return self.result.unit(f"snapshots/{self.name}/{field}")
+        return self.result.unit(f"snapshots/{self._home(field) or self.name}/{field}")
 
 
 class Result:

@@ -3,7 +3,7 @@ import h5py
 import numpy as np
 from synthetic import write_result
 
-UNITS = {"plastic_shear_strain": "", "cohesion": "Pa", "friction_angle": "rad", "body": ""}
+UNITS = {"plastic_shear_strain": "-", "cohesion": "Pa", "friction_angle": "rad", "body": ""}
 
 
 def lattice(width, height, h):
@@ -45,8 +45,10 @@ def write_soil(path, X, h, fields=None, displacement=None, time=(0.0, 1.0), hist
                                "initial_volume": volume, "body": np.zeros(len(X))}.items():
                 group[name] = fields.get(name, data)
             for name in set(fields) - set(group):
-                data = fields[name]
-                group[name] = data if name in ("cohesion", "friction_angle") else share * data
+                constant = name in ("cohesion", "friction_angle")  # written once
+                if constant and k:
+                    continue
+                group[name] = fields[name] if constant else share * fields[name]
                 group[name].attrs["unit"] = UNITS.get(name, "Pa")
     return path
 

@@ -8,7 +8,7 @@ from synthetic_soil import lattice, vectors, write_soil_study
 from testbed_reports.dataset import read_study_folder
 from testbed_reports.drawing import FigureError
 from testbed_reports.figures import draw
-from testbed_reports.maps import INCLUSION
+from testbed_reports.maps import INCLUSION, _stripe
 from testbed_reports.style import Style
 
 WALL = '[[wall]]\nname = "cap"\nmin = [-1.0, 2.0]\nmax = [3.0, 2.5]\n'
@@ -88,6 +88,16 @@ def test_deformed_grid_colours_by_initial_position(study, pattern, same):
     own = X[X[:, 1] < 1.5]
     dark = cells(panels(drawing)[0])[1].get_facecolor()[:, 0] < 0.6
     assert (dark == (same(*(own[:, :2] // 0.5).T) == 1)).all()
+
+
+@pytest.mark.parametrize("points, expected", [(80, 16), (20, 4), (24, 4), (23, 4), (3, 1)])
+def test_default_stripes_hold_whole_points(points, expected):
+    assert _stripe(points * 0.05, 0.05) == pytest.approx(expected * 0.05)
+
+
+def test_a_field_that_does_not_change_is_found_in_the_first_snapshot(study):
+    assert "friction_angle" not in study.runs[0].result.snapshots[1].fields
+    assert study.runs[0].result.snapshots[1]["friction_angle"][0] == pytest.approx(np.pi / 6)
 
 
 def test_no_such_snapshot_is_told(study):
