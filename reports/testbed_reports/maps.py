@@ -137,7 +137,12 @@ def _walls(snapshot):
             moved, time = result.support(wall["name"], "displacement"), result.history("time")
             shift = np.array([np.interp(snapshot.time, time, moved[:, k]) for k in range(2)])
             low, high = low + shift, high + shift
-        boxes.append((low, high))
+        door = wall.get("door") if snapshot.time >= wall.get("door_opens", 0.0) else None
+        if door:  # an opening along the longer side
+            along = np.arange(2) == np.argmax(high - low)
+            boxes += [(low, np.where(along, door[0], high)), (np.where(along, door[1], low), high)]
+        else:
+            boxes.append((low, high))
     return boxes
 
 

@@ -200,7 +200,8 @@ def layer_profile(result):
 def shear_layer(result):
     """A layer sheared by the wall 'top': its stress-displacement curve, the softening branch, dissipation and band width.
 
-    tau and u are positive along the motion. The slope is -du/dtau, which is L/k - H/G for a band of height L that softens by k.
+    tau and u are positive along the motion. The row of the slope is -du/dtau; `postpeak_slope` is du/dtau, which is H/G - L/k for a
+    band of height L that softens by k.
     Dissipation: work less the elastic energy at the end, less the residual stress times the plastic displacement.
     """
     numbers = result.reference
@@ -219,7 +220,7 @@ def shear_layer(result):
     dissipation = trapezoid(stress, u) - 0.5 * stress[-1] * elastic - residual * (u[-1] - elastic)
     rows = {("peak", "stress"): stress[top], ("slope", "postpeak"): slope, ("dissipation", "total"): dissipation}
     _ratio(rows, ("peak", "ratio"), stress[top], numbers, "peak_stress")
-    _ratio(rows, ("slope", "ratio"), slope, numbers, "postpeak_slope")
+    _ratio(rows, ("slope", "ratio"), -slope, numbers, "postpeak_slope")
     _ratio(rows, ("dissipation", "ratio"), dissipation, numbers, "dissipation")
 
     y, strain, row = layer_profile(result)

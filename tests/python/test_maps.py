@@ -82,6 +82,14 @@ def test_walls_stand_where_they_have_moved_to(study):
     assert bottoms == pytest.approx([2.0 - 0.1, 2.0 - 0.2])
 
 
+def test_an_open_door_is_a_gap(study, monkeypatch):
+    floor = {"name": "floor", "min": [0.0, -1.0], "max": [1.0, 0.0], "door": [0.4, 0.6], "door_opens": 3.0}
+    monkeypatch.setitem(study.runs[0].result.resolved, "wall", [floor])
+    axes = panels(drawn(study, kind="field", component="plastic_shear_strain", snapshot=[0, 1], where={"variant": "lpfdm"}))
+    assert [len(a.patches) for a in axes] == [1, 2]
+    assert [(p.get_x(), p.get_x() + p.get_width()) for p in axes[1].patches] == [(-0.0, 0.4), (0.6, 1.0)]
+
+
 @pytest.mark.parametrize("pattern, same", [("checker", lambda i, j: (i + j) % 2), ("strata", lambda i, j: j % 2)])
 def test_deformed_grid_colours_by_initial_position(study, pattern, same):
     drawing = drawn(study, kind="field", deformed_grid=True, pattern=pattern, spacing=0.5)

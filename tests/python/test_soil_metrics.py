@@ -128,7 +128,7 @@ def layer(soil, way=1.0, curve=LAYER, **changes):
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_shear_layer(soil, way):
     slope, loss = BAND / SOFT - 1.0 / STIFF, BAND * (TAU_P - TAU_R) ** 2 / (2.0 * SOFT)
-    r = rows(layer(soil, way, reference={"width": 0.25, "postpeak_slope": slope, "dissipation": loss / 2, "band_width": 0.5,
+    r = rows(layer(soil, way, reference={"width": 0.25, "postpeak_slope": -slope, "dissipation": loss / 2, "band_width": 0.5,
                                          "peak_stress": TAU_P}))
     assert r == pytest.approx({
         ("peak", "stress"): TAU_P, ("peak", "ratio"): 1.0, ("slope", "postpeak"): slope, ("slope", "ratio"): 1.0,
