@@ -1,4 +1,5 @@
 """Maps over the points: a field, or stripes of the initial position that show the motion."""
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from . import components
 from .components import of_snapshot
 from .drawing import (Drawing, FigureError, axis_scale, by_series, chosen, one_size, snapshot_of, where_of_title, with_result,
                       with_unit)
+from .spelling import did_you_mean
 from .style import WIDTH, plt
 
 SAND = ("#E3CD9B", "#7A5C36")  # light and dark stripes
@@ -152,6 +154,15 @@ def _draw_walls(axis, snapshot, view):
         axis.add_patch(Rectangle(low, *(high - low), facecolor="0.93", edgecolor=WALL, hatch="/////", linewidth=0.6, zorder=0.5))
 
 
+def _draw_curves(axis, snapshot, names):
+    """Reference curves of the scene, such as a measured surface."""
+    known = snapshot.result.curves
+    for name, line in zip(names, itertools.cycle(("--", "-.", ":"))):
+        if name not in known:
+            raise FigureError(f"the scene has no [[report.curve]] '{name}'{did_you_mean(name, known)}")
+        axis.plot(*known[name], color="black", linestyle=line, linewidth=1.0, zorder=3)
+
+
 def _view(snapshots):
     """Corners (2,), (2,) of what is shown: all points but for the farthest thousandth, with a margin."""
     every = np.concatenate([_squares(s).reshape(-1, 2) for s in snapshots])
@@ -173,7 +184,20 @@ def _bar(figure, mapped, layer, box):
     colours.set_label(layer.title)
 
 
+def _scale_axes(axis, view, width, height):
+    """True to scale, with ticks for a panel of so many inches."""
+    axis.set_xlim(view[0][0], view[1][0])
+    axis.set_ylim(view[0][1], view[1][1])
+    axis.set_aspect("equal")
+    if width < 0.4:  # room for one number
+        axis.set_xticks([0.0 if view[0][0] <= 0 <= view[1][0] else view[0][0]])
+    else:
+        axis.locator_params(axis="x", nbins=2 if width < 0.8 else 4)
+    axis.locator_params(axis="y", nbins=max(2, min(6, int(height / 0.35))))
+
+
 def field_maps(study, entry, style):
+    """Panels: variants across, snapshots down; errors, where there are any, below the values."""
     notes, stripes = [], entry.get("deformed_grid", False)
     runs = with_result(one_size(chosen(study, entry), entry), notes)
     series = [(label, run) for label, own in by_series(runs, entry, style).items() for run in own]
@@ -216,14 +240,8 @@ def field_maps(study, entry, style):
                 if layer.data[line][k] is not None:
                     mapped = _draw_points(axis, snapshot, layer.data[line][k], layer, entry)
                 _draw_walls(axis, snapshot, view)
-                axis.set_xlim(view[0][0], view[1][0])
-                axis.set_ylim(view[0][1], view[1][1])
-                axis.set_aspect("equal")
-                if panel < 0.4:  # room for one number
-                    axis.set_xticks([0.0 if view[0][0] <= 0 <= view[1][0] else view[0][0]])
-                else:
-                    axis.locator_params(axis="x", nbins=2 if panel < 0.8 else 4)
-                axis.locator_params(axis="y", nbins=max(2, min(6, int(height / 0.35))))
+                _draw_curves(axis, snapshot, entry.get("curves", []))
+                _scale_axes(axis, view, panel, height)
                 axis.set_title(label, pad=3, fontsize=8 if len(label) * 0.07 < panel + gap else 6)
                 if k % columns:
                     axis.tick_params(labelleft=False)
@@ -241,6 +259,8 @@ def field_maps(study, entry, style):
         notes.insert(0, where_of_title(snapshots))
     if not stripes and "range" not in entry:
         notes.append("Colours span the 1st to 99th percentile")
+    if entry.get("curves"):
+        notes.append(f"Broken lines: reference {', '.join(entry['curves'])}".replace("_", " "))
     if any(_inclusions(s, entry).any() for s in snapshots):
         notes.append("Other bodies than the first are grey")
     return Drawing(figure, [run for _, run in series], [n for n in dict.fromkeys(notes) if n])

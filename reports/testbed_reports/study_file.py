@@ -38,7 +38,7 @@ FIGURE_KINDS = {
     "profile": ({"component": TEXT}, {"along": TEXT, "panels": TEXT, "L": NUMBER + LIST, "band": LIST,
                                       "snapshot": (int,)}),
     "field": ({}, {"component": TEXT, "L": NUMBER, "range": LIST, "error": FLAG, "columns": (int,), "snapshot": (int,) + LIST,
-                   "inclusions": FLAG, "deformed_grid": FLAG, "pattern": TEXT, "spacing": NUMBER}),
+                   "inclusions": FLAG, "curves": LIST, "deformed_grid": FLAG, "pattern": TEXT, "spacing": NUMBER}),
     "curve": ({"x": TEXT, "y": TEXT}, {f"{key}{side}": kind for side in ("x", "y") for key, kind in (
         ("offset_", TEXT + NUMBER), ("scale_", TEXT + NUMBER))} | {
         f"{side}_{key}": TEXT for side in ("x", "y") for key in ("support", "probe", "label", "unit")} | {
@@ -291,6 +291,7 @@ def read_study(path, need_scene=True):
     def check_figure(entry, index):
         """What one key asks of another."""
         check_list(entry, "snapshot", int, "whole numbers", index)
+        check_list(entry, "curves", TEXT, "names of [[report.curve]]", index)
         check_list(entry, "levels", TEXT + NUMBER, "numbers or names of report.reference", index)
         if entry["kind"] == "field":
             if ("component" in entry) == entry.get("deformed_grid", False):

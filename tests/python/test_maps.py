@@ -90,6 +90,16 @@ def test_an_open_door_is_a_gap(study, monkeypatch):
     assert [(p.get_x(), p.get_x() + p.get_width()) for p in axes[1].patches] == [(-0.0, 0.4), (0.6, 1.0)]
 
 
+def test_a_measured_surface_is_drawn_over_the_points(study, monkeypatch):
+    for run in study.runs:
+        monkeypatch.setitem(run.result.resolved["report"], "curve", [{"name": "surface", "x": [0.0, 1.0], "y": [2.0, 1.0]}])
+    drawing = drawn(study, kind="field", component="plastic_shear_strain", curves=["surface"])
+    assert [a.lines[0].get_ydata().tolist() for a in panels(drawing)] == [[2.0, 1.0]] * 2
+    assert "Broken lines: reference surface" in drawing.notes
+    with pytest.raises(FigureError, match="no .*'surfac', did you mean 'surface'"):
+        drawn(study, kind="field", component="plastic_shear_strain", curves=["surfac"])
+
+
 @pytest.mark.parametrize("pattern, same", [("checker", lambda i, j: (i + j) % 2), ("strata", lambda i, j: j % 2)])
 def test_deformed_grid_colours_by_initial_position(study, pattern, same):
     drawing = drawn(study, kind="field", deformed_grid=True, pattern=pattern, spacing=0.5)

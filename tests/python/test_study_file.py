@@ -106,6 +106,7 @@ FIELD, CURVE = '[[figure]]\nkind = "field"\n', '[[figure]]\nkind = "curve"\n'
     (FIELD + "deformed_grid = true\nspacing = 0\n", "s.toml:6: 'spacing'.*positive"),
     (FIELD + "deformed_grid = true\nsnapshot = [0, 1.5]\n", "s.toml:6: 'snapshot'.*whole numbers"),
     (FIELD + "deformed_grid = true\nsnapshot = []\n", "'snapshot'.*whole numbers"),
+    (FIELD + "deformed_grid = true\ncurves = [1]\n", "s.toml:6: 'curves'.*names of"),
     (CURVE + 'x = "time"\n', "lacks the key 'y'"),
     (CURVE + 'x = "time"\ny = "reaction_y"\ny_support = "a"\ny_probe = "b"\n', "s.toml:8: .*'y' from a support or a probe"),
     (CURVE + 'x = "time"\ny = "max_stress"\nlevels = [true]\n', "s.toml:7: 'levels'.*numbers or names"),
