@@ -92,28 +92,27 @@ def shear_band(result):
     return rows
 
 
-def _columns(result, x, weights):
-    """(place (N,) of each point's column, sum of weights per column (C,), left edge of the first): columns of one cell size."""
-    edge = math.floor(x.min() / result.cell_size) * result.cell_size
-    place = ((x - edge) / result.cell_size).astype(int)
-    return place, np.bincount(place, weights), edge
-
-
 def heap(result):
-    """(inside (N,), spacing): the points in the columns that hang together with the thickest one.
+    """(N,) the points above `base` in the columns that hang together with the thickest one.
 
-    A column belongs to the heap when its material would make half a layer of points, and no thinner column lies between.
+    A column belongs to the heap when its material above the base would make half a layer of points, and no thinner column lies between.
     """
     snapshot = result.final
     spacing = result.reference.get("point_spacing", _spacing(snapshot))
     finite = np.isfinite(snapshot["position"]).all(axis=1)
     if not finite.all():
         raise MetricError("a point has no finite position")
-    place, volume, _ = _columns(result, snapshot["position"][:, 0], snapshot["volume"])
+    above = snapshot["position"][:, 1] > result.reference.get("base", 0.0)
+    x = snapshot["position"][:, 0]
+    edge = math.floor(x.min() / result.cell_size) * result.cell_size
+    place = ((x - edge) / result.cell_size).astype(int)
+    volume = np.bincount(place, snapshot["volume"] * above)
     thick = volume / result.cell_size >= 0.5 * spacing
     thickest, part = int(np.argmax(volume)), np.cumsum(~thick)
     connected = thick & (part == part[thickest])
-    return connected[place], spacing
+    if not above.any():
+        raise MetricError("no point lies above report.reference.base")
+    return connected[place] & above
 
 
 def _top_by_column(result, points, at, base):
@@ -132,7 +131,7 @@ def _rms(values):
 def runout(result):
     """Front, free surface and failure line of a heap that flows to the right, at the last snapshot."""
     snapshot, numbers, curves = result.final, result.reference, result.curves
-    inside, _ = heap(result)
+    inside = heap(result)
     front = float(np.max(snapshot["position"][inside, 0] + 0.5 * np.sqrt(snapshot["volume"][inside])))
     rows, L, base = {("runout", "front"): front}, result.cell_size, numbers.get("base", 0.0)
     _ratio(rows, ("runout", "ratio"), front, numbers, "runout")

@@ -71,6 +71,17 @@ def test_a_flow_along_a_known_surface(soil):
                                           ("failure_line", "rms"): 0.1})
 
 
+def test_a_heap_on_a_layer_begins_at_the_base(soil):
+    X = lattice(3.0, 1.0, 0.1)
+    X = X[(X[:, 1] < 0.5) | (X[:, 0] < 0.8)]
+    curves = toml_curves(surface=([0.0, 1.0], [0.9, 0.9]))
+    r = rows(soil(X, 0.1, metrics="runout", scene_extra=curves, reference={"base": 0.5}))
+    assert r["runout", "front"] == pytest.approx(0.8)
+    assert r["surface", "rms"] == pytest.approx(math.sqrt((4 * 0.1**2 + 0.4**2) / 5))  # the last column holds none above the base
+    assert rows(soil(X, 0.1, metrics="runout"))["runout", "front"] == pytest.approx(3.0)
+    assert "above report.reference.base" in metrics.grade(soil(X, 0.1, metrics="runout", reference={"base": 2.0})).errors[0]
+
+
 def test_surface_beyond_the_measured_front_is_above_the_base(soil):
     X = lattice(0.8, 0.3, 0.1)
     curves = toml_curves(surface=([0.0, 0.4], [0.3, 0.3]))
