@@ -148,8 +148,8 @@ void check_inclusion(const Scene& scene, const BodySpec& body, const std::string
     const BodySpec& host = scene.body(body.inside);
     for (const Vec2& corner : outline(body))
         if (!contains(host, corner, 1e-6 * scene.grid.cell_size))
-            return problems.add(key, fmt::format("inclusion '{}' reaches ({}, {}) m, outside body '{}'", body.name, corner[0], corner[1],
-                                                 host.name));
+            return problems.add(
+                key, fmt::format("inclusion '{}' reaches ({}, {}) m, outside body '{}'", body.name, corner[0], corner[1], host.name));
 }
 
 /// A number is checked here; an expression when it is evaluated at the points.
@@ -185,8 +185,8 @@ void check_strength(const MaterialSpec& m, const std::string& key, Problems& pro
     check_number(
         m.strength->cohesion, key + ".strength.cohesion", [](double c) { return c >= 0; }, "must not be negative", problems);
     check_number(
-        m.strength->friction_angle, key + ".strength.friction_angle", [&](double phi) { return phi >= 0 && phi < right_angle; },
-        angle_rule, problems);
+        m.strength->friction_angle, key + ".strength.friction_angle", [&](double phi) { return phi >= 0 && phi < right_angle; }, angle_rule,
+        problems);
     const double psi = m.strength->dilatancy_angle;
     if (!(psi >= 0 && psi < right_angle))
         problems.add(key + ".strength.dilatancy_angle", fmt::format("{}, not {}", angle_rule, psi));
@@ -235,13 +235,14 @@ void check_strength(const MaterialSpec& m, const std::string& key, Problems& pro
         const RandomSpec& r = *m.random;
         if (r.seed < 0)
             problems.add(key + ".random.seed", "must not be negative");
-        for (const auto& [value, name] : {std::pair{r.cohesion_deviation, "cohesion_deviation"}, {r.friction_deviation, "friction_deviation"}})
+        for (const auto& [value, name] :
+             {std::pair{r.cohesion_deviation, "cohesion_deviation"}, {r.friction_deviation, "friction_deviation"}})
             if (!(value >= 0 && value <= 2))
                 problems.add(key + ".random." + name, fmt::format("a relative deviation in [0, 2] is asked, not {}", value));
         positive(r.correlation_length, ".random.correlation_length");
         if ((r.field == "correlated") != r.correlation_length.has_value())
-            problems.add(key + ".random.correlation_length", r.correlation_length ? "only for field = \"correlated\""
-                                                                                  : "missing, field = \"correlated\" needs it");
+            problems.add(key + ".random.correlation_length",
+                         r.correlation_length ? "only for field = \"correlated\"" : "missing, field = \"correlated\" needs it");
     }
 }
 
@@ -264,9 +265,10 @@ void check_wall(const Scene& scene, const WallSpec& wall, const std::string& key
     for (std::size_t k = 0; k < 2 && wall.motion == "hand_off"; ++k)
         for (const double face : {wall.min[k], wall.max[k]})
             if (const double cells = (face - grid.origin[k]) / grid.cell_size; std::abs(cells - std::round(cells)) > 1e-6)
-                return problems.add(key, fmt::format("the face of wall '{}' at {} = {} m lies between lines of nodes; move it to a multiple of "
-                                                     "the cell size {} m, or set motion = \"smooth\"",
-                                                     wall.name, "xy"[k], face, grid.cell_size));
+                return problems.add(key,
+                                    fmt::format("the face of wall '{}' at {} = {} m lies between lines of nodes; move it to a multiple of "
+                                                "the cell size {} m, or set motion = \"smooth\"",
+                                                wall.name, "xy"[k], face, grid.cell_size));
     if (wall.door)
     {
         const std::size_t along = door_direction(wall);
@@ -289,11 +291,11 @@ void check_wall(const Scene& scene, const WallSpec& wall, const std::string& key
         const auto path = wall_path(wall, scene.expression_constants(), scene.time.end);
         for (std::size_t n = 0; n < path.size(); ++n)
             if (const Vec2& u = path[n]; outside({wall.min[0] + u[0], wall.min[1] + u[1]}, {wall.max[0] + u[0], wall.max[1] + u[1]}))
-                return problems.add(key + ".velocity",
-                                    fmt::format("wall '{}' leaves the lattice at t = {:.4g} s, after a travel of ({:.4g}, {:.4g}) m; make the "
-                                                "lattice larger or the travel shorter",
-                                                wall.name, static_cast<double>(n) * scene.time.end / static_cast<double>(path.size() - 1), u[0],
-                                                u[1]));
+                return problems.add(
+                    key + ".velocity",
+                    fmt::format("wall '{}' leaves the lattice at t = {:.4g} s, after a travel of ({:.4g}, {:.4g}) m; make the "
+                                "lattice larger or the travel shorter",
+                                wall.name, static_cast<double>(n) * scene.time.end / static_cast<double>(path.size() - 1), u[0], u[1]));
     }
     catch (const ExpressionError& e)
     {
@@ -321,7 +323,8 @@ void check_nonlocal(const Scene& scene, Problems& problems)
             if (!first)
                 first = &*s->nonlocal;
             else if (s->nonlocal->internal_length != first->internal_length || s->nonlocal->weight != first->weight)
-                problems.add(fmt::format("material[{}].softening.nonlocal", k), "all nonlocal materials share one internal_length and weight");
+                problems.add(fmt::format("material[{}].softening.nonlocal", k),
+                             "all nonlocal materials share one internal_length and weight");
         }
 }
 }  // namespace

@@ -140,4 +140,33 @@ void spread(const Lattice& lattice, const Body& body, std::size_t first_bin, std
                          to[k] = sum(total[k]);
                  });
 }
+
+/// The transpose: each point takes the weighted values of its S x S cells or nodes.
+/// @param index (i, j) -> number of the cell or node @param take (p, lanes, value)
+template <class Support, class Index, class Take>
+void interpolate(const Lattice& lattice, const Body& body, const std::vector<double>& values, Index&& index, Take&& take)
+{
+    constexpr int S = Support::S;
+    const auto& bins = body.bins.list();
+    parallel_for(bins.size(),
+                 [&](std::size_t b)
+                 {
+                     std::array<double, static_cast<std::size_t>(S * S)> value;
+                     for (int j = 0; j < S; ++j)
+                         for (int i = 0; i < S; ++i)
+                             value[static_cast<std::size_t>(j * S + i)] = values[index(bins[b].i + i, bins[b].j + j)];
+                     const BinFrame frame(lattice, bins[b]);
+                     for_each_pack(bins[b].begin, bins[b].end,
+                                   [&](std::size_t p, const auto& lanes)
+                                   {
+                                       const Corner c = frame.corner<Support>(body.points, p, lanes);
+                                       const auto wx = Support::weights(c.ax, c.wx), wy = Support::weights(c.ay, c.wy);
+                                       Pack sum(0.0);
+                                       for (int j = 0; j < S; ++j)
+                                           for (int i = 0; i < S; ++i)
+                                               sum += wx[i] * wy[j] * Pack(value[static_cast<std::size_t>(j * S + i)]);
+                                       take(p, lanes, sum);
+                                   });
+                 });
+}
 }  // namespace testbed

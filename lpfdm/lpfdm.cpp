@@ -1,5 +1,6 @@
 #include "lpfdm/lpfdm.hpp"
 
+#include "core/nonlocal.hpp"
 #include "core/point_loads.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
@@ -26,6 +27,8 @@ public:
             cell_force_.resize(grid_.lattice.cells());
             point_loads_.emplace(scene);
         }
+        if (has_nonlocal_softening(scene))
+            nonlocal_.emplace(scene, grid_.lattice.cell_size, grid_.lattice.cell_stride(), grid_.lattice.cells());
         if (options_.hourglass > 0)
             hourglass_.resize(grid_.lattice.cells());
         for (const Body& body : bodies_)
@@ -45,6 +48,12 @@ public:
                    if (moved_)
                        rebuild();
                });
+        if (nonlocal_)
+            timer_("nonlocal strain",
+                   [&] {
+                       nonlocal_->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
+                                                          [&](int i, int j) { return grid_.lattice.cell(i, j); });
+                   });
         timer_("cell averages (7)(8)", [&] { cell_averages<Support>(grid_, bodies_, workspace_); });
         timer_("nodal forces (9)(10)", [&] { nodal_forces(grid_); });
         timer_("convection (13)",
@@ -117,7 +126,8 @@ public:
     std::size_t bytes() const override
     {
         return bytes_of(bodies_) + grid_.bytes() + was_active_.capacity() + workspace_.capacity() * sizeof(double) +
-               (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) + (point_loads_ ? point_loads_->bytes() : 0);
+               (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) + (point_loads_ ? point_loads_->bytes() : 0) +
+               (nonlocal_ ? nonlocal_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
@@ -258,6 +268,7 @@ private:
     std::vector<double> workspace_;             ///< sums of bins, and the way of a field to its new order
     std::vector<Vec2> hourglass_, cell_force_;  ///< empty unless the scene has them
     std::optional<PointLoads> point_loads_;
+    std::optional<NonlocalStrain> nonlocal_;
     PhaseTimer timer_;
     double wave_speed_ = 0, internal_ = 0, lag_ = 0;
     bool moved_ = false, started_ = false;

@@ -1,6 +1,7 @@
 #include "mpm/mpm.hpp"
 
 #include "core/gather.hpp"
+#include "core/nonlocal.hpp"
 #include "core/point_loads.hpp"
 #include "mpm/transfer.hpp"
 
@@ -25,6 +26,8 @@ public:
     {
         if (has_point_loads(scene))
             point_loads_.emplace(scene);
+        if (has_nonlocal_softening(scene))
+            nonlocal_.emplace(scene, lattice_.cell_size, lattice_.node_stride(), lattice_.nodes());
         rebuild();
     }
 
@@ -37,6 +40,9 @@ public:
                    if (moved_)
                        rebuild();
                });
+        if (nonlocal_)
+            timer_("nonlocal strain", [&]
+                   { nonlocal_->template apply<Shape>(lattice_, bodies_, gather_, [&](int i, int j) { return lattice_.node(i, j); }); });
         if (options_.scheme == "usf")
         {
             timer_("points to nodes",
@@ -118,7 +124,7 @@ public:
         return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
                    sizeof(double) +
-               (point_loads_ ? point_loads_->bytes() : 0);
+               (point_loads_ ? point_loads_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
@@ -303,6 +309,7 @@ private:
     std::vector<double> carrier_x_, carrier_y_;
     std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls
     std::optional<PointLoads> point_loads_;
+    std::optional<NonlocalStrain> nonlocal_;
     PhaseTimer timer_;
     double internal_ = 0, lag_ = 0;
     bool moved_ = false, started_ = false;

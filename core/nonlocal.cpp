@@ -1,0 +1,74 @@
+#include "core/nonlocal.hpp"
+
+namespace testbed
+{
+double nonlocal_weight(const NonlocalSpec& spec, double r)
+{
+    const double s = r / spec.internal_length;
+    return (spec.weight == "gauss" ? 1 : s) * std::exp(-s * s);
+}
+
+NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size, std::size_t stride, std::size_t entities)
+    : stride_(stride),
+      entities_(entities)
+{
+    const NonlocalSpec* spec = nullptr;
+    for (const BodySpec& body : scene.bodies)
+    {
+        const auto& softening = scene.material(body.material).softening;
+        over_nonlocal_.push_back(softening && softening->nonlocal ? softening->nonlocal->over_nonlocal : 0);
+    }
+    for (const MaterialSpec& material : scene.materials)
+        if (material.softening && material.softening->nonlocal)
+            spec = &*material.softening->nonlocal;
+    reach_ = static_cast<int>(std::ceil(3 * spec->internal_length / cell_size));  // the weight falls to 1e-4
+    for (int j = -reach_; j <= reach_; ++j)
+        for (int i = -reach_; i <= reach_; ++i)
+            weight_.push_back(nonlocal_weight(*spec, cell_size * std::hypot(i, j)));
+    const std::size_t padding = static_cast<std::size_t>(reach_) * (stride_ + 1);
+    volume_.assign(entities_ + 2 * padding, 0.0);
+    strain_.assign(entities_ + 2 * padding, 0.0);
+    mean_.assign(entities_, 0.0);
+}
+
+void NonlocalStrain::collect(const Gather& gather)
+{
+    const std::size_t padding = static_cast<std::size_t>(reach_) * (stride_ + 1);
+    for (const auto e : filled_)
+        volume_[e + padding] = strain_[e + padding] = 0;
+    filled_ = gather.active();
+    gather.sum<2>(partial_,
+                  [&](std::size_t e, const std::array<double, 2>& s)
+                  {
+                      volume_[e + padding] = s[0];
+                      strain_[e + padding] = s[1];
+                  });
+}
+
+/// Entities are numbered row by row; a row of the weight stops at the ends of the lattice's row.
+void NonlocalStrain::average(const std::vector<std::uint32_t>& active)
+{
+    const int stride = static_cast<int>(stride_), width = 2 * reach_ + 1;
+    const std::size_t padding = static_cast<std::size_t>(reach_) * (stride_ + 1);
+    parallel_for(active.size(),
+                 [&](std::size_t a)
+                 {
+                     const std::size_t e = active[a];
+                     const int column = static_cast<int>(e % stride_);
+                     const int from = std::max(-reach_, -column), to = std::min(reach_, stride - 1 - column);
+                     double volume = 0, strain = 0;
+                     for (int j = -reach_; j <= reach_; ++j)
+                     {
+                         const double* w = &weight_[static_cast<std::size_t>((j + reach_) * width + reach_)];
+                         const std::size_t row = e + padding + static_cast<std::size_t>(j * stride);  // wraps for negative j, as it must
+                         for (int i = from; i <= to; ++i)
+                         {
+                             const std::size_t other = row + static_cast<std::size_t>(i);
+                             volume += w[i] * volume_[other];
+                             strain += w[i] * strain_[other];
+                         }
+                     }
+                     mean_[e] = volume > 0 ? strain / volume : 0;
+                 });
+}
+}  // namespace testbed
