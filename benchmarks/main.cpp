@@ -1,5 +1,6 @@
 #include "core/geometry.hpp"
 #include "core/method_limits.hpp"
+#include "core/point_driver.hpp"
 #include "core/provenance.hpp"
 #include "core/results.hpp"
 #include "core/run.hpp"
@@ -13,7 +14,9 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <fstream>
 #include <iostream>
+#include <sstream>
 #include <unistd.h>
 
 /// The `testbed` command.
@@ -148,6 +151,10 @@ int run(int argc, char** argv)
     CLI::App* check_command = app.add_subcommand("check", "parse a scene and say what it would use");
     add_scene_options(*check_command, options);
     check_command->add_flag("--resolved", resolved, "print the scene with all its defaults, as TOML");
+    std::string law, csv;
+    CLI::App* point_command = app.add_subcommand("point", "drive a law alone along a strain path; CSV on stdout");
+    point_command->add_option("law", law, "path file (TOML)")->required();
+    point_command->add_option("-o,--output", csv, "write here instead of stdout");
     CLI::App* doc_command = app.add_subcommand("doc", "every table and key of a scene");
     doc_command->add_option("table", table, "only this table");
     app.add_subcommand("list", "methods and material laws");
@@ -170,6 +177,15 @@ int run(int argc, char** argv)
     }
     if (check_command->parsed())
         check(options, resolved);
+    else if (point_command->parsed())
+    {
+        std::ostringstream text;
+        drive_point(law, text);
+        if (csv.empty())
+            fmt::print("{}", text.str());
+        else if (!(std::ofstream(csv) << text.str()).flush())
+            throw SceneError(fmt::format("cannot write '{}'", csv));
+    }
     else if (doc_command->parsed())
         fmt::print("{}", scene_documentation(table));
     else

@@ -61,6 +61,21 @@ void set_override(toml::table& root, const std::string& assignment, Problems& pr
 }
 }  // namespace
 
+toml::table parse_toml(const std::string& path)
+{
+    try
+    {
+        return toml::parse_file(path);
+    }
+    catch (const toml::parse_error& e)
+    {
+        const auto at = e.source().begin;
+        if (at.line == 0)
+            throw SceneError(fmt::format("{}: {}", path, e.description()));
+        throw SceneError(fmt::format("{}:{}:{}: not TOML: {}", path, at.line, at.column, e.description()));
+    }
+}
+
 const MaterialSpec& Scene::material(const std::string& name) const
 {
     return *std::find_if(materials.begin(), materials.end(), [&](const auto& m) { return m.name == name; });
@@ -117,18 +132,7 @@ LoadedScene load_scene(const std::string& path, const std::string& method, const
         if (!problems.errors().empty())
             throw SceneError(fmt::format("{}", fmt::join(problems.errors(), "\n")));
     };
-    toml::table root;
-    try
-    {
-        root = toml::parse_file(path);
-    }
-    catch (const toml::parse_error& e)
-    {
-        const auto at = e.source().begin;
-        if (at.line == 0)
-            throw SceneError(fmt::format("{}: {}", path, e.description()));
-        throw SceneError(fmt::format("{}:{}:{}: not TOML: {}", path, at.line, at.column, e.description()));
-    }
+    toml::table root = parse_toml(path);
     for (const auto& assignment : overrides)
         set_override(root, assignment, problems);
     if (!method.empty())

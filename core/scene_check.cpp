@@ -329,6 +329,23 @@ void check_nonlocal(const Scene& scene, Problems& problems)
 }
 }  // namespace
 
+void check_materials(const Scene& scene, Problems& problems, const std::function<std::string(std::size_t)>& key_of)
+{
+    for (std::size_t k = 0; k < scene.materials.size(); ++k)
+    {
+        const MaterialSpec& m = scene.materials[k];
+        const std::string key = key_of(k);
+        if (!(m.density > 0))
+            problems.add(key + ".density", fmt::format("must be positive, not {}", m.density));
+        if (!(m.poissons_ratio > -1 && m.poissons_ratio < 0.5))
+            problems.add(key + ".poissons_ratio",
+                         fmt::format("must lie in (-1, 0.5), not {}: at 0.5 an explicit method has no stable time step", m.poissons_ratio));
+        check_number(
+            m.youngs_modulus, key + ".youngs_modulus", [](double E) { return E > 0; }, "must be positive", problems);
+        check_strength(m, key, problems);
+    }
+}
+
 void check_scene(const Scene& scene, Problems& problems)
 {
     const GridSpec& grid = scene.grid;
@@ -358,24 +375,7 @@ void check_scene(const Scene& scene, Problems& problems)
         problems.add("gravity.ramp", "must not be negative");
     if (scene.damping && !(scene.damping->local >= 0 && scene.damping->local < 1))
         problems.add("damping.local", fmt::format("must lie in [0, 1), not {}", scene.damping->local));
-    for (std::size_t k = 0; k < scene.materials.size(); ++k)
-    {
-        const MaterialSpec& m = scene.materials[k];
-        const std::string key = fmt::format("material[{}]", k);
-        positive(m.density, key + ".density");
-        if (!(m.poissons_ratio > -1 && m.poissons_ratio < 0.5))
-            problems.add(key + ".poissons_ratio",
-                         fmt::format("must lie in (-1, 0.5), not {}: at 0.5 an explicit method has no stable time step", m.poissons_ratio));
-        if (const char* end = m.youngs_modulus.c_str(); !m.youngs_modulus.empty())
-        {
-            char* stop = nullptr;
-            const double value = std::strtod(end, &stop);
-            if (*stop == '\0')
-                positive(value, key + ".youngs_modulus");
-        }
-    }
-    for (std::size_t k = 0; k < scene.materials.size(); ++k)
-        check_strength(scene.materials[k], fmt::format("material[{}]", k), problems);
+    check_materials(scene, problems, [](std::size_t k) { return fmt::format("material[{}]", k); });
     check_nonlocal(scene, problems);
     check_unique_names(scene.materials, "material", problems);
     if (scene.materials.empty())

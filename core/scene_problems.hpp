@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <functional>
 #include <toml++/toml.h>
 
 namespace testbed
@@ -53,5 +54,7 @@ inline std::string suggestion(const std::string& word, const std::vector<std::st
 
 /// Checks what one key cannot tell: ranges, names, geometry. Warnings need a scene that is right. Defined in scene_check.cpp.
 void check_scene(const Scene& scene, Problems& problems);
+/// The part that concerns materials. @param key (k) -> what the file calls material number k
+void check_materials(const Scene& scene, Problems& problems, const std::function<std::string(std::size_t)>& key);
 void check_limits(const Scene& scene, Problems& problems);
 }  // namespace testbed

@@ -9,6 +9,9 @@
 
 namespace testbed
 {
+/// @throws SceneError with the place where the file is not TOML
+toml::table parse_toml(const std::string& path);
+
 inline std::string kind_of(const toml::node& node)
 {
     static const std::map<toml::node_type, const char*> names{
@@ -293,8 +296,11 @@ private:
     void read(const std::string& path, const toml::node& node, std::vector<T>& values)
     {
         if (const toml::array* array = array_of(path, node, 0))
+        {
+            values.clear();
             for (const toml::node& element : *array)
                 read(path, element, values.emplace_back());
+        }
     }
     template <std::size_t N>
     void read(const std::string& path, const toml::node& node, std::array<std::string, N>& values)
