@@ -269,6 +269,12 @@ void check_wall(const Scene& scene, const WallSpec& wall, const std::string& key
                                     fmt::format("the face of wall '{}' at {} = {} m lies between lines of nodes; move it to a multiple of "
                                                 "the cell size {} m, or set motion = \"smooth\"",
                                                 wall.name, "xy"[k], face, grid.cell_size));
+    for (std::size_t k = 0; k < 2 && wall.motion == "smooth"; ++k)
+        if (const double width = wall.max[k] - wall.min[k]; width > 0 && width < 2 * grid.cell_size - slack)
+            return problems.add(key,
+                                fmt::format("wall '{}' is {} m wide: a smooth wall is a plate, or at least two cells, {} m, wide, so that "
+                                            "its faces share no node",
+                                            wall.name, width, 2 * grid.cell_size));
     if (wall.door)
     {
         const std::size_t along = door_direction(wall);

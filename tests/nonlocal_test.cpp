@@ -1,0 +1,98 @@
+#include "core/nonlocal.hpp"
+#include "mpm/shape.hpp"
+#include "tests/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace testbed;
+
+namespace
+{
+std::string scene_text(double l, double m, const std::string& weight)
+{
+    return R"(
+[grid]
+size = [3.0, 3.0]
+cell_size = 0.1
+[time]
+end = 1.0
+[[material]]
+name = "soil"
+law = "mohr_coulomb"
+density = 1000.0
+youngs_modulus = 1e6
+poissons_ratio = 0.2
+[material.strength]
+cohesion = 9800.0
+friction_angle = 0.5
+[material.softening]
+kind = "linear"
+residual = 0.5
+strain = 0.1
+[material.softening.nonlocal]
+internal_length = )" +
+           std::to_string(l) + "\nover_nonlocal = " + std::to_string(m) + "\nweight = \"" + weight + R"("
+[[body]]
+name = "soil"
+material = "soil"
+shape = "box"
+min = [0.2, 0.3]
+max = [2.7, 2.8]
+points_per_cell = 2
+)";
+}
+
+template <class Support>
+void check_against_double_sum(const std::string& weight, double tolerance)
+{
+    const Scene scene = test::load(scene_text(0.4, 1.7, weight));
+    const Lattice lattice = make_lattice(scene.grid);
+    auto bodies = make_bodies(scene, lattice, {.box = Support::has_box});
+    std::vector<double> workspace;
+    bodies[0].bins.template rebuild<Support::has_box>(bodies[0].points, workspace);
+    constexpr bool cells = std::is_same_v<Support, PointSupport> || std::is_same_v<Support, DomainSupport>;
+    const auto index = [&](int i, int j) { return cells ? lattice.cell(i, j) : lattice.node(i, j); };
+    Gather gather(cells ? lattice.cells() : lattice.nodes());
+    const std::vector<const Bins*> bins{&bodies[0].bins};
+    gather.rebuild<Support::S>(bins, index);
+    Points& q = bodies[0].points;
+    const auto strain = [](double x, double y) { return 0.02 * (1 + std::sin(1.1 * x) * std::cos(0.8 * y)); };
+    for (std::size_t p = 0; p < q.count; ++p)
+        q.plastic_shear[p] = strain(q.x[p], q.y[p]);
+    NonlocalStrain nonlocal(scene, lattice.cell_size, cells ? lattice.cell_stride() : lattice.node_stride(),
+                            cells ? lattice.cells() : lattice.nodes());
+    nonlocal.apply<Support>(lattice, bodies, gather, index);
+    const NonlocalSpec& spec = *scene.materials[0].softening->nonlocal;
+    for (std::size_t p = 0; p < q.count; p += 37)
+    {
+        double sum = 0, total = 0;
+        for (std::size_t o = 0; o < q.count; ++o)
+        {
+            const double w = nonlocal_weight(spec, std::hypot(q.x[p] - q.x[o], q.y[p] - q.y[o]));
+            sum += w * q.plastic_shear[o];
+            total += w;
+        }
+        EXPECT_NEAR(q.softening_strain[p], -0.7 * q.plastic_shear[p] + 1.7 * sum / total, tolerance);
+    }
+}
+}  // namespace
+
+/// Against the double sum over points: the way over cells or nodes costs part of a cell's smoothing.
+TEST(Nonlocal, EqualsTheSumOverPoints)
+{
+    for (const std::string weight : {"gauss", "galavi_schweiger"})
+    {
+        check_against_double_sum<PointSupport>(weight, 8e-4);
+        check_against_double_sum<DomainSupport>(weight, 8e-4);
+        check_against_double_sum<LinearShape>(weight, 8e-4);
+        check_against_double_sum<GimpShape>(weight, 8e-4);
+    }
+}
+
+TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
+{
+    const Scene scene = test::load(scene_text(0.4, 1.7, "gauss"));
+    EXPECT_TRUE(has_nonlocal_softening(scene));
+    EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = "gauss"}, 2), std::exp(-1.0));
+    EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = "galavi_schweiger"}, 1), 0.5 * std::exp(-0.25));
+}

@@ -1,0 +1,195 @@
+#include "core/node_ops.hpp"
+#include "tests/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace testbed;
+
+namespace
+{
+const std::string specimen = R"(
+[grid]
+size = [4.0, 4.0]
+cell_size = 0.5
+[time]
+end = 1.0
+[[material]]
+name = "soil"
+law = "linear_elastic"
+density = 1000.0
+youngs_modulus = 1e6
+poissons_ratio = 0.2
+[[body]]
+name = "soil"
+material = "soil"
+shape = "box"
+min = [1.0, 0.0]
+max = [3.0, 3.0]
+)";
+
+std::string cap(const std::string& motion, const std::string& more = "")
+{
+    const std::string top = motion == "smooth" ? "4.0" : "3.5";
+    return "[[wall]]\nname = \"cap\"\nmin = [0.0, 3.0]\nmax = [4.0, " + top + "]\nvelocity = [\"0\", \"-2\"]\nmotion = \"" + motion +
+           "\"\n" + more;
+}
+
+struct Fixture
+{
+    Scene scene;
+    Lattice lattice;
+    NodeOps ops;
+    Nodes nodes;
+
+    explicit Fixture(const std::string& text)
+        : scene(test::load(specimen + text)),
+          lattice(make_lattice(scene.grid)),
+          ops(scene, lattice),
+          nodes(lattice.nodes())
+    {
+        std::fill(nodes.mass.begin(), nodes.mass.end(), 2.0);
+    }
+    void step(double t, double dt)
+    {
+        ops.begin_step(t, dt);
+        ops.end_step(dt);
+    }
+    /// Velocity in y that the walls leave of 1 everywhere, at column i.
+    std::vector<double> column(int i)
+    {
+        std::vector<double> vx(nodes.vx.size(), 1), vy(nodes.vy.size(), 1);
+        ops.restrain(nodes, vx, vy);
+        std::vector<double> values;
+        for (int j = 0; j <= lattice.ny; ++j)
+            values.push_back(vy[lattice.node(i, j)]);
+        return values;
+    }
+};
+}  // namespace
+
+/// Section 2.2: all nodes of a line move; after one cell of travel the next line does.
+TEST(Wall, HandsOffAfterOneCell)
+{
+    Fixture f(cap("hand_off"));
+    f.step(0, 0.1);
+    EXPECT_EQ(f.column(3), (std::vector<double>{1, 1, 1, 1, 1, 1, -2, -2, 1}));  // nodes at y = 3 and 3.5
+    f.step(0.1, 0.1);
+    f.ops.begin_step(0.2, 0.1);  // travel 0.4 < L
+    EXPECT_EQ(f.column(3), (std::vector<double>{1, 1, 1, 1, 1, 1, -2, -2, 1}));
+    f.ops.end_step(0.1);
+    f.ops.begin_step(0.3, 0.1);  // travel 0.6 > L
+    EXPECT_EQ(f.column(3), (std::vector<double>{1, 1, 1, 1, 1, -2, -2, 1, 1}));
+    EXPECT_DOUBLE_EQ((*f.ops.records()[0].displacement)[1], -2 * 0.3);
+}
+
+/// The smooth wall prescribes the velocity interpolated at its face, and passes on the same impulse as it takes.
+TEST(Wall, SmoothFaceMovesWithTheWall)
+{
+    Fixture f(cap("smooth"));
+    for (std::size_t n = 0; n < f.nodes.mass.size(); ++n)
+        f.nodes.mass[n] = 1 + static_cast<double>(n % 3);
+    f.step(0, 0.1);
+    f.ops.begin_step(0.1, 0.1);  // the faces are at y = 2.8 and 3.8
+    const auto v = f.column(3);
+    EXPECT_NEAR(0.4 * v[5] + 0.6 * v[6], -2, 1e-12);  // y = 2.5 and 3.0
+    EXPECT_NEAR(0.4 * v[7] + 0.6 * v[8], -2, 1e-12);
+    EXPECT_EQ(v[4], 1);
+}
+
+/// At a face between nodes the reaction balances the forces in the way of virtual work: what is left does not accelerate it.
+TEST(Wall, ReactionHoldsTheFace)
+{
+    Fixture f("[[wall]]\nname = \"floor\"\nmin = [0.0, 0.2]\nmax = [4.0, 0.2]\nmotion = \"smooth\"\nfix = \"y\"\n");
+    f.ops.begin_step(0, 0.1);
+    f.nodes.active.resize(f.nodes.mass.size());
+    std::iota(f.nodes.active.begin(), f.nodes.active.end(), 0u);
+    const std::size_t low = f.lattice.node(3, 0), high = f.lattice.node(3, 1);
+    f.nodes.mass[low] = 3;
+    f.nodes.fy[low] = -5;
+    f.nodes.fy[high] = -7;
+    f.nodes.fx[low] = 4;
+    f.ops.apply_forces(f.nodes, 0);
+    EXPECT_NEAR(0.6 * f.nodes.fy[low] / 3 + 0.4 * f.nodes.fy[high] / 2, 0, 1e-12);
+    EXPECT_NEAR(f.ops.records()[0].reaction[1], f.nodes.fy[low] + f.nodes.fy[high] + 12, 1e-12);
+    EXPECT_GT(f.ops.records()[0].reaction[1], 0);
+    EXPECT_EQ(f.nodes.fx[low], 4);  // a smooth wall does not hold what slides along it
+}
+
+/// Reactions are those of the soil's forces: damping has no part in them.
+TEST(Wall, ReactionBeforeDamping)
+{
+    Fixture f("[damping]\nlocal = 0.8\n[[boundary]]\nname = \"base\"\nwhere = \"y <= 0\"\nfix = \"xy\"\n");
+    f.ops.begin_step(0, 0.1);
+    const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 0)), free = static_cast<std::uint32_t>(f.lattice.node(3, 2));
+    f.nodes.active = {n, free};
+    f.nodes.fy[n] = -5;
+    f.nodes.fx[n] = 2;
+    f.nodes.vy[n] = f.nodes.vy[free] = 1;
+    f.nodes.fy[free] = 10;
+    f.ops.apply_forces(f.nodes, 0);
+    EXPECT_EQ(f.ops.records()[0].reaction, (Vec2{-2, 5}));
+    EXPECT_EQ(f.nodes.fy[n], 0);
+    EXPECT_DOUBLE_EQ(f.nodes.fy[free], 2);
+    EXPECT_FALSE(f.ops.records()[0].displacement.has_value());
+}
+
+TEST(Wall, DoorOpensWhenToldTo)
+{
+    Fixture f("[[wall]]\nname = \"floor\"\nmin = [0.0, 0.0]\nmax = [4.0, 0.0]\ndoor = [1.0, 2.5]\ndoor_opens = 0.5\n");
+    const auto row = [&]
+    {
+        std::vector<double> vx(f.nodes.vx.size(), 1), vy(f.nodes.vy.size(), 1), values;
+        f.ops.restrain(f.nodes, vx, vy);
+        for (int i = 0; i <= f.lattice.nx; ++i)
+            values.push_back(vy[f.lattice.node(i, 0)]);
+        return values;
+    };
+    f.ops.begin_step(0.4, 0.1);
+    EXPECT_EQ(row(), std::vector<double>(9, 0.0));
+    f.ops.begin_step(0.5, 0.1);
+    EXPECT_EQ(row(), (std::vector<double>{0, 0, 0, 1, 1, 0, 0, 0, 0}));  // its ends hold
+}
+
+TEST(Wall, StopsTheRunWhereItCannotGo)
+{
+    const std::string base = "[[boundary]]\nname = \"base\"\nwhere = \"y <= 0\"\nfix = \"xy\"\n";
+    Fixture f(cap("hand_off") + base);
+    for (int n = 0; n < 14; ++n)
+        f.step(0.1 * n, 0.1);
+    try
+    {
+        f.step(1.5, 0.3);
+        f.step(1.8, 0.3);
+        FAIL() << "the cap went through the base";
+    }
+    catch (const Diverged& e)
+    {
+        EXPECT_NE(std::string(e.what()).find("'cap' was pushed through the soil and has reached 'base'"), std::string::npos) << e.what();
+    }
+}
+
+TEST(Wall, ProblemsOfAScene)
+{
+    const auto expect = [](const std::string& text, const std::string& message)
+    {
+        try
+        {
+            test::load(specimen + text);
+            ADD_FAILURE() << "accepted: " << text;
+        }
+        catch (const SceneError& e)
+        {
+            EXPECT_NE(std::string(e.what()).find(message), std::string::npos) << e.what();
+        }
+    };
+    const std::string wall = "[[wall]]\nname = \"w\"\n";
+    expect(wall + "min = [0.0, 3.0]\nmax = [4.0, 4.5]\n", "outside the lattice");
+    expect(wall + "min = [0.0, 3.0]\nmax = [4.0, 3.5]\nmotion = \"smooth\"\n", "share no node");
+    expect(wall + "min = [0.0, 3.0]\nmax = [4.0, 3.5]\nvelocity = [\"0\", \"2\"]\n", "leaves the lattice at t = 0.25");
+    expect(wall + "min = [0.0, 3.1]\nmax = [4.0, 3.5]\n", "lies between lines of nodes");
+    expect(wall + "min = [1.0, 0.0]\nmax = [3.0, 0.0]\ndoor = [0.5, 2.0]\n", "wider than its wall");
+    expect(wall + "min = [1.0, 0.0]\nmax = [3.0, 0.0]\ndoor = [1.0, 1.5]\n", "no free node");
+    expect(wall + "min = [1.0, 0.0]\nmax = [1.0, 0.0]\n", "must lie above");
+    expect("[[boundary]]\nname = \"w\"\nwhere = \"y<=0\"\nfix = \"x\"\n" + wall + "min = [1.0, 0.0]\nmax = [3.0, 0.0]\n",
+           "name of a boundary, too");
+}
