@@ -30,59 +30,129 @@ public:
 
     const std::vector<Bin>& list() const { return bins_; }
 
-    /// Sorts the points by bin. @param workspace grows to the number of points
+    /// Notes that a point of bin number `b` may have left it. Different bins may be marked by different threads.
+    void mark(std::size_t b) { marked_[b] = 1; }
+
+    /// Sorts all points by bin. Returns whether the list of bins is another one than before.
+    /// @param workspace grows to the number of points
     /// @throws Diverged when a point has left the lattice or its position is not finite.
     template <bool has_box>
-    void rebuild(Points& points, std::vector<double>& workspace)
+    bool rebuild(Points& points, std::vector<double>& workspace)
     {
-        const std::size_t n = points.count;
-        place_.resize(n);  // first the bin of each point, then where it goes
-        parallel_for(n, [&](std::size_t p) { place_[p] = key<has_box>(points, p); });
-        for (const Bin& b : bins_)
+        marked_.assign(bins_.size(), 1);
+        return rebuild_marked<has_box>(points, workspace);
+    }
+
+    /// The same when only points of marked bins may have moved to another one: the others go where they go as a block.
+    template <bool has_box>
+    bool rebuild_marked(Points& points, std::vector<double>& workspace)
+    {
+        std::vector<Bin> before = std::move(bins_);
+        const bool is_first = before.empty();
+        if (is_first)
+        {
+            before.push_back({0, 0, 0, static_cast<std::uint32_t>(points.count)});
+            marked_.assign(1, 1);
+        }
+        for (const Bin& b : before)
             slot_[lattice_.cell(b.i, b.j)] = -1;
         bins_.clear();
-        for (std::size_t p = 0; p < n; ++p)
+        count<has_box>(points, before);
+        order();
+        arrange(before);
+        marked_.assign(bins_.size(), 0);
+        if (!moves_.empty())
         {
-            const std::uint32_t key = place_[p];
-            if (key == outside)
-                throw_left_lattice(points, p);
-            std::int32_t& slot = slot_[key];
+            make_room(workspace, points.count);
+            points.for_each_field([&](auto& field) { field.reorder(moves_, workspace.data()); });
+        }
+        return is_first || !std::equal(before.begin(), before.end(), bins_.begin(), bins_.end(),
+                                       [](const Bin& a, const Bin& b) { return a.i == b.i && a.j == b.j; });
+    }
+
+    std::size_t bytes() const
+    {
+        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + key_.capacity() * sizeof(std::uint32_t) +
+               moves_.capacity() * sizeof(Move) + marked_.capacity();
+    }
+
+private:
+    static constexpr std::uint32_t outside = ~std::uint32_t{0};
+
+    /// Counts the points of each bin and lists the bins, in the order in which they are met.
+    template <bool has_box>
+    void count(const Points& points, const std::vector<Bin>& before)
+    {
+        key_.resize(points.count);
+        parallel_for(before.size(),
+                     [&](std::size_t b)
+                     {
+                         if (marked_[b])
+                             for (std::size_t p = before[b].begin; p < before[b].end; ++p)
+                                 key_[p] = key<has_box>(points, p);
+                     });
+        const auto add = [&](std::size_t cell, std::uint32_t n)
+        {
+            std::int32_t& slot = slot_[cell];
             if (slot < 0)
             {
                 slot = static_cast<std::int32_t>(bins_.size());
-                bins_.push_back({lattice_.cell_i(key), lattice_.cell_j(key), 0, 0});
+                bins_.push_back({lattice_.cell_i(cell), lattice_.cell_j(cell), 0, 0});
             }
-            ++bins_[static_cast<std::size_t>(slot)].end;  // a count for now
-        }
+            bins_[static_cast<std::size_t>(slot)].end += n;
+        };
+        for (std::size_t b = 0; b < before.size(); ++b)
+            if (!marked_[b])
+                add(lattice_.cell(before[b].i, before[b].j), before[b].end - before[b].begin);
+            else
+                for (std::size_t p = before[b].begin; p < before[b].end; ++p)
+                {
+                    if (key_[p] == outside)
+                    {
+                        for (const Bin& met : bins_)
+                            slot_[lattice_.cell(met.i, met.j)] = -1;
+                        bins_.clear();
+                        throw_left_lattice(points, p);
+                    }
+                    add(key_[p], 1);
+                }
+    }
+
+    /// Bins in the order of their cells, with the place where the points of each begin.
+    void order()
+    {
         std::sort(bins_.begin(), bins_.end(),
                   [&](const Bin& a, const Bin& b) { return lattice_.cell(a.i, a.j) < lattice_.cell(b.i, b.j); });
         std::uint32_t begin = 0;
         for (std::size_t b = 0; b < bins_.size(); ++b)
         {
-            const std::uint32_t count = bins_[b].end;
+            const std::uint32_t n = bins_[b].end;
             bins_[b].begin = bins_[b].end = begin;
-            begin += count;
+            begin += n;
             slot_[lattice_.cell(bins_[b].i, bins_[b].j)] = static_cast<std::int32_t>(b);
         }
-        bool sorted = true;
-        for (std::size_t p = 0; p < n; ++p)
-        {
-            place_[p] = bins_[static_cast<std::size_t>(slot_[place_[p]])].end++;
-            sorted &= place_[p] == p;
-        }
-        if (sorted)
-            return;
-        make_room(workspace, n);
-        points.for_each_field([&](auto& field) { field.reorder(place_, workspace.data()); });
     }
 
-    std::size_t bytes() const
+    /// The blocks of points that move, neighbours with the same way taken together.
+    void arrange(const std::vector<Bin>& before)
     {
-        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + place_.capacity() * sizeof(std::uint32_t);
+        moves_.clear();
+        const auto move = [&](std::uint32_t from, std::size_t cell, std::uint32_t n)
+        {
+            std::uint32_t& to = bins_[static_cast<std::size_t>(slot_[cell])].end;
+            if (!moves_.empty() && moves_.back().from + moves_.back().count == from && moves_.back().to + moves_.back().count == to)
+                moves_.back().count += n;
+            else if (from != to)
+                moves_.push_back({from, to, n});
+            to += n;
+        };
+        for (std::size_t b = 0; b < before.size(); ++b)
+            if (!marked_[b])
+                move(before[b].begin, lattice_.cell(before[b].i, before[b].j), before[b].end - before[b].begin);
+            else
+                for (std::uint32_t p = before[b].begin; p < before[b].end; ++p)
+                    move(p, key_[p], 1);
     }
-
-private:
-    static constexpr std::uint32_t outside = ~std::uint32_t{0};
 
     template <bool has_box>
     std::uint32_t key(const Points& points, std::size_t p) const
@@ -111,7 +181,9 @@ private:
     Lattice lattice_;
     std::vector<Bin> bins_;
     std::vector<std::int32_t> slot_;
-    std::vector<std::uint32_t> place_;
+    std::vector<std::uint32_t> key_;  ///< cell of each point of a marked bin
+    std::vector<Move> moves_;
+    std::vector<char> marked_;
 };
 
 /// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), no longer does; true for NaN.

@@ -4,6 +4,7 @@
 #include "core/parallel.hpp"
 #include "core/simd.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -19,6 +20,12 @@ inline void make_room(std::vector<double>& workspace, std::size_t n)
     if (workspace.size() < n)
         std::vector<double>(n).swap(workspace);
 }
+
+/// `count` values from place `from` to place `to`.
+struct Move
+{
+    std::uint32_t from, to, count;
+};
 
 template <class T>
 class Field
@@ -47,11 +54,16 @@ public:
         return data_[p];
     }
 
-    /// Value p goes to place[p], by way of `workspace`, which must hold as many.
-    void reorder(std::span<const std::uint32_t> place, double* workspace)
+    /// Moves blocks of values, by way of `workspace`, which must hold as many as there are points.
+    void reorder(std::span<const Move> moves, double* workspace)
     {
-        parallel_for(place.size(), [&](std::size_t p) { workspace[place[p]] = static_cast<double>(data_[p]); });
-        parallel_for(place.size(), [&](std::size_t p) { data_[p] = static_cast<T>(workspace[p]); });
+        parallel_for(moves.size(), [&](std::size_t k) { std::copy_n(&data_[moves[k].from], moves[k].count, workspace + moves[k].to); });
+        parallel_for(moves.size(),
+                     [&](std::size_t k)
+                     {
+                         const double* from = workspace + moves[k].to;
+                         std::transform(from, from + moves[k].count, &data_[moves[k].to], [](double v) { return static_cast<T>(v); });
+                     });
     }
 
 private:

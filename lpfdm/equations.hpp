@@ -163,7 +163,8 @@ template <class Support, class Law>
 bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt)
 {
     Points& q = body.points;
-    const auto& bins = body.bins.list();
+    Bins& sorted = body.bins;
+    const auto& bins = sorted.list();
     std::atomic<bool> moved{false};
     parallel_for(bins.size(),
                  [&](std::size_t b)
@@ -185,7 +186,10 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt)
                                        left |= frame.left<Support>(q, p, lanes, x, y);
                                    });
                      if (left)
+                     {
+                         sorted.mark(b);
                          moved.store(true, std::memory_order_relaxed);
+                     }
                  });
     return moved;
 }

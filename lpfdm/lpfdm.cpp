@@ -140,12 +140,14 @@ private:
     void rebuild()
     {
         std::vector<const Bins*> bins;
+        bool other_bins = false;
         for (Body& body : bodies_)
         {
-            body.bins.template rebuild<Support::has_box>(body.points, workspace_);
+            other_bins |= body.bins.template rebuild_marked<Support::has_box>(body.points, workspace_);
             bins.push_back(&body.bins);
         }
-        left_ = grid_.rebuild<S>(bins);
+        if (other_bins)
+            left_ = grid_.rebuild<S>(bins);
         make_room(workspace_, grid_.gather.blocks() * 4);
         moved_ = false;
     }

@@ -136,13 +136,17 @@ private:
     void rebuild()
     {
         std::vector<const Bins*> bins;
+        bool other_bins = false;
         for (Body& body : bodies_)
         {
-            body.bins.template rebuild<Shape::has_box>(body.points, workspace_);
+            other_bins |= body.bins.template rebuild_marked<Shape::has_box>(body.points, workspace_);
             bins.push_back(&body.bins);
         }
-        gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
-        nodes_.active = gather_.active();
+        if (other_bins)
+        {
+            gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
+            nodes_.active = gather_.active();
+        }
         moved_ = false;
     }
 
@@ -294,7 +298,10 @@ private:
                                   left |= frame.left<Shape>(q, p, lanes, x, y);
                               });
                 if (left)
+                {
+                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
                     moved.store(true, std::memory_order_relaxed);
+                }
             });
         moved_ = moved;
     }
