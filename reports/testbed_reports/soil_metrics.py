@@ -95,10 +95,11 @@ def shear_band(result):
 def heap(result):
     """(N,) the points above `base` in the columns that hang together with the thickest one.
 
-    A column belongs to the heap when its material above the base would make half a layer of points, and no thinner column lies between.
+    A column belongs to the heap when its material above the base is `front_height` thick (default: half a layer of points), and no thinner
+    column lies between.
     """
     snapshot = result.final
-    spacing = result.reference.get("point_spacing", _spacing(snapshot))
+    least = result.reference.get("front_height", 0.5 * result.reference.get("point_spacing", _spacing(snapshot)))
     finite = np.isfinite(snapshot["position"]).all(axis=1)
     if not finite.all():
         raise MetricError("a point has no finite position")
@@ -107,7 +108,7 @@ def heap(result):
     edge = math.floor(x.min() / result.cell_size) * result.cell_size
     place = ((x - edge) / result.cell_size).astype(int)
     volume = np.bincount(place, snapshot["volume"] * above)
-    thick = volume / result.cell_size >= 0.5 * spacing
+    thick = volume / result.cell_size >= least
     thickest, part = int(np.argmax(volume)), np.cumsum(~thick)
     connected = thick & (part == part[thickest])
     if not above.any():
@@ -180,9 +181,9 @@ def collapse_load(result):
     rows = {}
     for name, factor in (("first", 1.0), ("second", 2.0)):
         found = _first_above(load, excess, factor * threshold)
-        if found is None:
+        if found is None and name == "first":
             raise MetricError(f"'collapse_load': the crest stays within {factor * threshold:g} m of its elastic displacement")
-        rows["collapse_load", name] = found
+        rows["collapse_load", name] = math.nan if found is None else found
     return rows
 
 

@@ -79,6 +79,7 @@ def test_a_heap_on_a_layer_begins_at_the_base(soil):
     assert r["runout", "front"] == pytest.approx(0.8)
     assert r["surface", "rms"] == pytest.approx(math.sqrt((4 * 0.1**2 + 0.4**2) / 5))  # the last column holds none above the base
     assert rows(soil(X, 0.1, metrics="runout"))["runout", "front"] == pytest.approx(3.0)
+    assert rows(soil(X, 0.1, metrics="runout", reference={"front_height": 0.6}))["runout", "front"] == pytest.approx(0.8)
     assert "above report.reference.base" in metrics.grade(soil(X, 0.1, metrics="runout", reference={"base": 2.0})).errors[0]
 
 
@@ -115,7 +116,9 @@ def test_collapse_load(soil):
 
 
 def test_no_collapse_is_told(soil):
-    assert "stays within 0.025 m" in metrics.grade(collapse(soil, CREST * (G < 0.67) + 0.01 * G * (G >= 0.67))).errors[0]
+    r = rows(collapse(soil, CREST * (G < 0.67) + 0.01 * G * (G >= 0.67)))  # passes the first threshold only
+    assert r["collapse_load", "first"] == pytest.approx(6.5, abs=2e-3) and math.isnan(r["collapse_load", "second"])
+    assert "stays within 0.0125 m" in metrics.grade(collapse(soil, 0.01 * G)).errors[0]
 
 
 # A layer of 1 m, G = 1 MPa, a band of 0.25 m that softens by k = 200 kPa from 40 kPa to 10 kPa (k above G L / H would snap back).
