@@ -47,7 +47,7 @@ private:
     const MaterialSpec& material_;
 };
 
-PointParameters read_parameters(const Scene& scene, const MaterialSpec& material, const std::vector<Vec2>& positions,
+PointParameters read_parameters(const Scene& scene, const BodySpec& body, const MaterialSpec& material, const std::vector<Vec2>& positions,
                                 std::uint32_t first_id)
 {
     const ParameterReader reader(scene, material);
@@ -66,9 +66,11 @@ PointParameters read_parameters(const Scene& scene, const MaterialSpec& material
         "must lie between the dilatancy angle and pi/2 (radians)");
     if (material.random)
     {
+        // an inclusion must not change the soil around it
+        const std::vector<std::uint32_t> number = numbers_without_inclusions(scene, body);
         RandomStrength random(*material.random);
         for (std::size_t p = 0; p < positions.size(); ++p)
-            random.draw(positions[p], first_id + static_cast<std::uint32_t>(p), out.cohesion[p], out.friction[p]);
+            random.draw(positions[p], first_id + number[p], out.cohesion[p], out.friction[p]);
         out.truncated_share = random.truncated_share();
     }
     return out;
@@ -112,7 +114,7 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
         if (material.has_strength() && !needs.strength)
             material.law = "linear_elastic";
         const std::size_t n = positions.size();
-        const PointParameters parameters = read_parameters(scene, material, positions, next_id);
+        const PointParameters parameters = read_parameters(scene, spec, material, positions, next_id);
         const Varying varying = parameters.varying();
         const double largest = *std::max_element(parameters.stiffness.begin(), parameters.stiffness.end());
         const Strength<> strength = material.has_strength() && !varying.strength
@@ -122,6 +124,7 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
                           {},
                           make_material(material, {largest, material.poissons_ratio}, strength, scene.grid.cell_size, varying),
                           Bins(lattice),
+                          scene.confinement ? scene.confinement->pressure : 0.0,
                           parameters.truncated_share});
 
         Points& q = bodies.back().points;

@@ -13,6 +13,7 @@ struct Body
     Points points;
     Material material;
     Bins bins;
+    double confinement = 0;      ///< pressure on free surfaces: forces come from the stress beyond it [Pa]
     double truncated_share = 0;  ///< of the random strengths drawn
 };
 

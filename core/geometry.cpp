@@ -80,6 +80,18 @@ std::vector<Vec2> fill(const Scene& scene, const BodySpec& body)
     return points;
 }
 
+std::vector<std::uint32_t> numbers_without_inclusions(const Scene& scene, const BodySpec& body)
+{
+    Scene alone = scene;
+    std::erase_if(alone.bodies, [&](const BodySpec& other) { return other.inside == body.name; });
+    const std::vector<Vec2> part = fill(scene, body), all = fill(alone, body);
+    std::vector<std::uint32_t> numbers;
+    for (std::uint32_t n = 0; n < all.size() && numbers.size() < part.size(); ++n)
+        if (all[n] == part[numbers.size()])
+            numbers.push_back(n);
+    return numbers;
+}
+
 bool is_number(const std::string& text)
 {
     char* stop = nullptr;

@@ -16,6 +16,9 @@ std::vector<Vec2> outline(const BodySpec& body);
 /// which goes without those points.
 std::vector<Vec2> fill(const Scene& scene, const BodySpec& body);
 
+/// For each point of a body its number among those that the body would have without inclusions.
+std::vector<std::uint32_t> numbers_without_inclusions(const Scene& scene, const BodySpec& body);
+
 /// Side of the square that one point stands for [m].
 inline double spacing(const BodySpec& body, const GridSpec& grid)
 {

@@ -56,19 +56,22 @@ void NonlocalStrain::average(const std::vector<std::uint32_t>& active)
                      const std::size_t e = active[a];
                      const int column = static_cast<int>(e % stride_);
                      const int from = std::max(-reach_, -column), to = std::min(reach_, stride - 1 - column);
-                     double volume = 0, strain = 0;
+                     Pack volume(0.0), strain(0.0);
+                     const auto count = static_cast<std::size_t>(to - from + 1);
                      for (int j = -reach_; j <= reach_; ++j)
                      {
-                         const double* w = &weight_[static_cast<std::size_t>((j + reach_) * width + reach_)];
-                         const std::size_t row = e + padding + static_cast<std::size_t>(j * stride);  // wraps for negative j, as it must
-                         for (int i = from; i <= to; ++i)
-                         {
-                             const std::size_t other = row + static_cast<std::size_t>(i);
-                             volume += w[i] * volume_[other];
-                             strain += w[i] * strain_[other];
-                         }
+                         const double* weight = &weight_[static_cast<std::size_t>((j + reach_) * width + reach_ + from)];
+                         const auto other = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(e + padding) + j * stride + from);
+                         for_each_pack(0, count,
+                                       [&](std::size_t i, const auto& lanes)
+                                       {
+                                           const Pack w = lanes.keep(lanes.load(weight + i));
+                                           volume += w * lanes.load(&volume_[other + i]);
+                                           strain += w * lanes.load(&strain_[other + i]);
+                                       });
                      }
-                     mean_[e] = volume > 0 ? strain / volume : 0;
+                     const double total = sum(volume);
+                     mean_[e] = total > 0 ? sum(strain) / total : 0;
                  });
 }
 }  // namespace testbed

@@ -140,6 +140,17 @@ struct WallSpec
     }
 };
 
+struct ConfinementSpec
+{
+    double pressure = 0;
+
+    template <class V>
+    void describe(V& v)
+    {
+        v.required("pressure", pressure, "Pa", "on every free surface, wherever it moves; start from an initial_stress that balances it");
+    }
+};
+
 struct TractionSpec
 {
     std::string name, body, face;
@@ -297,6 +308,7 @@ struct Scene
     std::vector<WallSpec> walls;
     std::vector<TractionSpec> tractions;
     std::optional<BodyForceSpec> body_force;
+    std::optional<ConfinementSpec> confinement;
     std::vector<ProbeSpec> probes;
     std::map<std::string, ExactSpec> exact;  ///< by kinematics
     OutputSpec output;
@@ -323,6 +335,7 @@ struct Scene
         v.list("boundary", boundaries, "fixities and rollers");
         v.list("wall", walls, "rigid walls, moving or not");
         v.list("traction", tractions, "loads on faces");
+        v.table("confinement", confinement, "cell pressure of a compression test");
         v.table("body_force", body_force, "acceleration field, for manufactured solutions");
         v.list("probe", probes, "means over chosen points in the history");
         v.tables("exact", exact, {"small_strain", "hypoelastic"}, "exact solution for methods that integrate this law");

@@ -379,6 +379,8 @@ void check_scene(const Scene& scene, Problems& problems)
         positive(*scene.time.wall_clock_limit, "time.wall_clock_limit");
     if (scene.gravity && scene.gravity->ramp < 0)
         problems.add("gravity.ramp", "must not be negative");
+    if (scene.confinement && !(scene.confinement->pressure >= 0))
+        problems.add("confinement.pressure", fmt::format("must not be negative, not {}", scene.confinement->pressure));
     if (scene.damping && !(scene.damping->local >= 0 && scene.damping->local < 1))
         problems.add("damping.local", fmt::format("must lie in [0, 1), not {}", scene.damping->local));
     check_materials(scene, problems, [](std::size_t k) { return fmt::format("material[{}]", k); });
@@ -435,6 +437,13 @@ void check_limits(const Scene& scene, Problems& problems)
 {
     const double critical = critical_time_step(scene);
     const double dt = time_step(scene);
+    for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+        if (scene.bodies[k].initial_stress && find_variant(scene.method).family == "fem")
+            problems.warn(fmt::format("body[{}].initial_stress", k), "the FEM reference starts without stress: it is left out");
+    if (!scene.tractions.empty() && find_variant(scene.method).family == "lpfdm" && scene.lpfdm.support == "domain")
+        problems.warn("traction",
+                      "domains reach into the cells outside a loaded face, and what they hold there may run away; use [confinement] "
+                      "for a pressure, or lpfdm.support = \"point\"");
     if (dt > critical * (1 + 1e-12))
         problems.warn(scene.time.dt ? "time.dt" : "time.cfl",
                       fmt::format("the time step {:.4g} s is above the critical one, {:.4g} s", dt, critical));

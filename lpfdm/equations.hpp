@@ -8,7 +8,7 @@
 
 namespace testbed
 {
-/// Eqs. (7), (8): mass and smeared stress of each cell. @param workspace room for 4 S^2 numbers per bin
+/// Eqs. (7), (8): mass and smeared stress (beyond the confining pressure) of each cell. @param workspace room for 4 S^2 numbers per bin
 template <class Support>
 void cell_averages(LpfdmGrid& grid, const std::vector<Body>& bodies, std::vector<double>& workspace)
 {
@@ -16,13 +16,13 @@ void cell_averages(LpfdmGrid& grid, const std::vector<Body>& bodies, std::vector
     for (const Body& body : bodies)
     {
         const Points& q = body.points;
-        spread<Support, 4>(
-            grid.lattice, body, first_bin, workspace,
-            [&](std::size_t p, const auto& lanes)
-            {
-                const Pack v = volume<Support>(q, p, lanes);
-                return std::array<Pack, 4>{Pack(q.mass), v * lanes.load(&q.sxx[p]), v * lanes.load(&q.syy[p]), v * lanes.load(&q.sxy[p])};
-            });
+        spread<Support, 4>(grid.lattice, body, first_bin, workspace,
+                           [&](std::size_t p, const auto& lanes)
+                           {
+                               const Pack v = volume<Support>(q, p, lanes), pressure(body.confinement);
+                               return std::array<Pack, 4>{Pack(q.mass), v * (lanes.load(&q.sxx[p]) + pressure),
+                                                          v * (lanes.load(&q.syy[p]) + pressure), v * lanes.load(&q.sxy[p])};
+                           });
         first_bin += body.bins.list().size();
     }
     const double area = grid.lattice.cell_size * grid.lattice.cell_size;

@@ -1,7 +1,8 @@
 #include "lpfdm/lpfdm.hpp"
 
+#include "core/body_force.hpp"
 #include "core/nonlocal.hpp"
-#include "core/point_loads.hpp"
+#include "core/tractions.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
 
@@ -17,16 +18,18 @@ class Lpfdm final : public Solver
 public:
     explicit Lpfdm(const Scene& scene)
         : grid_(make_lattice(scene.grid)),
-          bodies_(make_bodies(scene, grid_.lattice, {.box = Support::has_box, .initial_position = has_point_loads(scene)})),
+          bodies_(make_bodies(scene, grid_.lattice, {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
           node_ops_(scene, grid_.lattice),
           was_active_(grid_.lattice.nodes(), 0),
           options_(scene.lpfdm)
     {
-        if (has_point_loads(scene))
+        if (scene.body_force)
         {
             cell_force_.resize(grid_.lattice.cells());
-            point_loads_.emplace(scene);
+            body_force_.emplace(*scene.body_force, scene.expression_constants());
         }
+        if (!scene.tractions.empty())
+            tractions_.emplace(scene);
         if (has_nonlocal_softening(scene))
             nonlocal_.emplace(scene, grid_.lattice.cell_size, grid_.lattice.cell_stride(), grid_.lattice.cells());
         if (options_.hourglass > 0)
@@ -69,8 +72,10 @@ public:
         timer_("node operations (11)(15)",
                [&]
                {
-                   if (point_loads_)
-                       add_point_loads(t);
+                   if (body_force_)
+                       add_body_force(t);
+                   if (tractions_)
+                       tractions_->apply(grid_.lattice, bodies_, nodes_, t);
                    node_ops_.apply_forces(nodes_, t);
                });
         lag_ = started_ ? 0.5 * dt : 0;
@@ -126,7 +131,7 @@ public:
     std::size_t bytes() const override
     {
         return bytes_of(bodies_) + grid_.bytes() + was_active_.capacity() + workspace_.capacity() * sizeof(double) +
-               (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) + (point_loads_ ? point_loads_->bytes() : 0) +
+               (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) +
                (nonlocal_ ? nonlocal_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
@@ -211,10 +216,10 @@ private:
             convect<CentralConvection>(grid_, dt);
     }
 
-    void add_point_loads(double t)
+    void add_body_force(double t)
     {
-        point_loads_->template apply<Support>(grid_.lattice, bodies_, grid_.gather, t,
-                                              [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
+        body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather, t,
+                                             [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
         grid_.for_each_node(
             [&](std::size_t i, std::size_t first_cell)
             {
@@ -269,7 +274,8 @@ private:
     LpfdmSpec options_;
     std::vector<double> workspace_;             ///< sums of bins, and the way of a field to its new order
     std::vector<Vec2> hourglass_, cell_force_;  ///< empty unless the scene has them
-    std::optional<PointLoads> point_loads_;
+    std::optional<BodyForce> body_force_;
+    std::optional<Tractions> tractions_;
     std::optional<NonlocalStrain> nonlocal_;
     PhaseTimer timer_;
     double wave_speed_ = 0, internal_ = 0, lag_ = 0;

@@ -1,8 +1,9 @@
 #include "mpm/mpm.hpp"
 
+#include "core/body_force.hpp"
 #include "core/gather.hpp"
 #include "core/nonlocal.hpp"
-#include "core/point_loads.hpp"
+#include "core/tractions.hpp"
 #include "mpm/transfer.hpp"
 
 #include <atomic>
@@ -18,14 +19,17 @@ class Mpm final : public Solver
 public:
     explicit Mpm(const Scene& scene)
         : lattice_(make_lattice(scene.grid)),
-          bodies_(make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true, .initial_position = has_point_loads(scene)})),
+          bodies_(
+              make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true, .initial_position = scene.body_force.has_value()})),
           node_ops_(scene, lattice_),
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
           options_(scene.mpm)
     {
-        if (has_point_loads(scene))
-            point_loads_.emplace(scene);
+        if (scene.body_force)
+            body_force_.emplace(*scene.body_force, scene.expression_constants());
+        if (!scene.tractions.empty())
+            tractions_.emplace(scene);
         if (has_nonlocal_softening(scene))
             nonlocal_.emplace(scene, lattice_.cell_size, lattice_.node_stride(), lattice_.nodes());
         rebuild();
@@ -66,13 +70,15 @@ public:
         timer_("node operations",
                [&]
                {
-                   if (point_loads_)
-                       point_loads_->template apply<Shape>(lattice_, bodies_, gather_, t,
-                                                           [&](std::size_t n, const std::array<double, 2>& f)
-                                                           {
-                                                               nodes_.fx[n] += f[0];
-                                                               nodes_.fy[n] += f[1];
-                                                           });
+                   if (body_force_)
+                       body_force_->template apply<Shape>(lattice_, bodies_, gather_, t,
+                                                          [&](std::size_t n, const std::array<double, 2>& f)
+                                                          {
+                                                              nodes_.fx[n] += f[0];
+                                                              nodes_.fy[n] += f[1];
+                                                          });
+                   if (tractions_)
+                       tractions_->apply(lattice_, bodies_, nodes_, t);
                    node_ops_.apply_forces(nodes_, t);
                });
         lag_ = started_ ? 0.5 * dt : 0;
@@ -124,7 +130,7 @@ public:
         return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
                    sizeof(double) +
-               (point_loads_ ? point_loads_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
+               (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
@@ -315,7 +321,8 @@ private:
     std::vector<double> workspace_;  ///< sums of bins, and the way of a field to its new order
     std::vector<double> carrier_x_, carrier_y_;
     std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls
-    std::optional<PointLoads> point_loads_;
+    std::optional<BodyForce> body_force_;
+    std::optional<Tractions> tractions_;
     std::optional<NonlocalStrain> nonlocal_;
     PhaseTimer timer_;
     double internal_ = 0, lag_ = 0;

@@ -91,7 +91,8 @@ inline constexpr std::size_t sums_of = what == Scatter::momentum_and_force ? 5
                                        : what == Scatter::momentum         ? 3
                                                                            : 2;
 
-/// m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V sigma . grad N_i, to the blocks of each bin.
+/// m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V (sigma + p I) . grad N_i with the confining pressure p, to the blocks
+/// of each bin.
 /// With B-bar the mean in-plane stress works on the cell's dilatation: dual to the strain of gather_strain().
 template <class Shape, class Strain, Scatter what>
 void scatter(const Lattice& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial)
@@ -120,8 +121,8 @@ void scatter(const Lattice& lattice, const Body& body, std::size_t first_bin, st
                                        if constexpr (what != Scatter::momentum)
                                        {
                                            const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
-                                           txx = v * lanes.load(&q.sxx[p]);
-                                           tyy = v * lanes.load(&q.syy[p]);
+                                           txx = v * (lanes.load(&q.sxx[p]) + Pack(body.confinement));
+                                           tyy = v * (lanes.load(&q.syy[p]) + Pack(body.confinement));
                                            txy = v * lanes.load(&q.sxy[p]);
                                            mean = Pack(0.5) * (txx + tyy);
                                        }

@@ -190,6 +190,22 @@ TEST(Inclusion, TakesPointsOfItsHost)
     EXPECT_THROW(test::load(soil + grain, "", {"body.grain.inside=sand"}), SceneError);
 }
 
+TEST(Inclusion, LeavesTheRandomSoilAroundItAsItIs)
+{
+    const std::string grain =
+        "[[body]]\nname = \"grain\"\nmaterial = \"soil\"\nshape = \"disk\"\ninside = \"soil\"\ncenter = [2.0, 1.5]\nradius = 0.7\n";
+    const Scene whole = test::load(with(random_table)), scene = test::load(with(random_table) + grain);
+    const auto all = make_bodies(whole, make_lattice(whole.grid), {}), part = make_bodies(scene, make_lattice(scene.grid), {});
+    const Points &a = all[0].points, &b = part[0].points;
+    std::size_t p = 0;
+    for (std::size_t n = 0; n < b.count; ++n)
+    {
+        while (a.x[p] != b.x[n] || a.y[p] != b.y[n])
+            ++p;
+        EXPECT_EQ(a.cohesion[p], b.cohesion[n]);
+    }
+}
+
 TEST(InitialStress, IsThatOfTheScene)
 {
     const Scene scene = test::load(soil + "initial_stress = [\"0.5*1e4*(Y-3)\", \"1e4*(Y-3)\", \"0.4*1e4*(Y-3)\", \"7\"]\n");
