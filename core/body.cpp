@@ -68,7 +68,7 @@ PointParameters read_parameters(const Scene& scene, const BodySpec& body, const 
     {
         // an inclusion must not change the soil around it
         const std::vector<std::uint32_t> number = numbers_without_inclusions(scene, body);
-        RandomStrength random(*material.random);
+        RandomStrength random(*material.random, strength.dilatancy_angle);
         for (std::size_t p = 0; p < positions.size(); ++p)
             random.draw(positions[p], first_id + number[p], out.cohesion[p], out.friction[p]);
         out.truncated_share = random.truncated_share();

@@ -65,7 +65,9 @@ void NodeOps::begin_step(double t, double dt)
         walls_[k].begin_step(t, dt, own);
         if (const auto& nodes = walls_[k].new_nodes(); !nodes.empty())
             if (const Restraint* other = in_the_way(nodes, own, restraints_))
-                throw Diverged(fmt::format("wall '{}' was pushed through the soil and has reached '{}'", own.name, other->name));
+                throw Diverged(
+                    fmt::format("wall '{}' was pushed through the soil and has reached '{}' after a travel of ({:.4g}, {:.4g}) m", own.name,
+                                other->name, walls_[k].displacement()[0], walls_[k].displacement()[1]));
     }
 }
 
@@ -74,9 +76,14 @@ void NodeOps::apply_forces(Nodes& nodes, double t)
     if (gravity_)
         gravity_->apply(nodes, t);
     bool has_pairs = false;
+    std::for_each(restraints_.rbegin(), restraints_.rend(),  // a node of two is driven by the later one
+                  [&](Restraint& r) {
+                      r.reaction = {r.x.react_at_nodes(nodes.fx), r.y.react_at_nodes(nodes.fy)};
+                  });
     for (Restraint& r : restraints_)
     {
-        r.reaction = {r.x.react(nodes, nodes.fx), r.y.react(nodes, nodes.fy)};
+        r.reaction[0] += r.x.react_at_faces(nodes, nodes.fx);
+        r.reaction[1] += r.y.react_at_faces(nodes, nodes.fy);
         has_pairs |= !r.x.pairs.empty() || !r.y.pairs.empty();
     }
     if (!damping_)
@@ -85,8 +92,8 @@ void NodeOps::apply_forces(Nodes& nodes, double t)
     if (has_pairs)  // what damping puts on the nodes of a face must not move the wall
         for (const Restraint& r : restraints_)
         {
-            r.x.react(nodes, nodes.fx);
-            r.y.react(nodes, nodes.fy);
+            r.x.react_at_faces(nodes, nodes.fx);
+            r.y.react_at_faces(nodes, nodes.fy);
         }
 }
 

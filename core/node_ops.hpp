@@ -80,8 +80,8 @@ public:
     void begin_step(double t, double dt);
     void end_step(double dt)
     {
-        for (std::size_t k = 0; k < walls_.size(); ++k)
-            walls_[k].end_step(dt, restraints_[first_wall_ + k]);
+        for (Wall& wall : walls_)
+            wall.end_step(dt);
     }
     /// Gravity, the reactions of supports and walls, and damping of what is then out of balance.
     void apply_forces(Nodes& nodes, double t);

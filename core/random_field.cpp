@@ -53,19 +53,19 @@ double RandomStrength::deviate(std::uint64_t stream, const Vec2& X, std::uint32_
     return standard_normal(seed, stream, id);
 }
 
-void RandomStrength::scale(double& value, double deviation, double z, double largest)
+void RandomStrength::scale(double& value, double deviation, double z, double least, double largest)
 {
     if (deviation == 0 || value == 0)
         return;
     const double drawn = value * (1 + deviation * z);
-    value = std::clamp(drawn, 0.0, largest);
+    value = std::clamp(drawn, least, largest);
     ++drawn_;
     truncated_ += value != drawn;
 }
 
 void RandomStrength::draw(const Vec2& X, std::uint32_t id, double& cohesion, double& friction)
 {
-    scale(cohesion, spec_.cohesion_deviation, deviate(0, X, id), std::numeric_limits<double>::infinity());
-    scale(friction, spec_.friction_deviation, deviate(1, X, id), largest_random_friction);
+    scale(cohesion, spec_.cohesion_deviation, deviate(0, X, id), 0, std::numeric_limits<double>::infinity());
+    scale(friction, spec_.friction_deviation, deviate(1, X, id), least_, largest_random_friction);
 }
 }  // namespace testbed

@@ -31,18 +31,20 @@ inline constexpr double largest_random_friction = 80 * std::numbers::pi / 180;
 class RandomStrength
 {
 public:
-    explicit RandomStrength(const RandomSpec& spec) : spec_(spec) {}
+    /// @param least friction angle: the dilatancy angle, below which flow would create energy [rad]
+    RandomStrength(const RandomSpec& spec, double least) : spec_(spec), least_(least) {}
 
     /// @param cohesion [Pa] @param friction [rad]: means, replaced by the drawn values @param id of the point
     void draw(const Vec2& X, std::uint32_t id, double& cohesion, double& friction);
-    /// Share of the values drawn that were cut to [0, infinity) or [0, 80 degrees].
+    /// Share of the values drawn that were cut to [0, infinity) or [dilatancy angle, 80 degrees].
     double truncated_share() const { return drawn_ > 0 ? static_cast<double>(truncated_) / static_cast<double>(drawn_) : 0; }
 
 private:
     double deviate(std::uint64_t stream, const Vec2& X, std::uint32_t id) const;
-    void scale(double& value, double deviation, double z, double largest);
+    void scale(double& value, double deviation, double z, double least, double largest);
 
     RandomSpec spec_;
+    double least_;
     std::size_t drawn_ = 0, truncated_ = 0;
 };
 }  // namespace testbed

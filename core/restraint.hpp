@@ -42,8 +42,8 @@ struct ComponentRestraint
             v[p.high] += high * inverse_mass(carrier, p.high);
         }
     }
-    /// Adds the reaction to the force f, so that the prescribed velocity stays; returns it [N/m].
-    double react(const Nodes& carrier, std::vector<double>& f) const
+    /// Add the reaction to the force f, so that the prescribed velocity stays; return it [N/m]. At nodes, then at faces.
+    double react_at_nodes(std::vector<double>& f) const
     {
         double reaction = 0;
         for (const auto i : nodes)
@@ -51,6 +51,11 @@ struct ComponentRestraint
             reaction -= f[i];
             f[i] = 0;
         }
+        return reaction;
+    }
+    double react_at_faces(const Nodes& carrier, std::vector<double>& f) const
+    {
+        double reaction = 0;
         for (const FacePair& p : pairs)
         {
             const double a = (1 - p.share) * f[p.low] * inverse_mass(carrier, p.low) + p.share * f[p.high] * inverse_mass(carrier, p.high);
@@ -63,13 +68,14 @@ struct ComponentRestraint
     }
 
 private:
-    /// What the face gives to both nodes to change its own velocity by dv; nothing to a node without mass.
+    /// What the face gives to both nodes to change its own velocity by dv. Without mass on both sides no soil lies at the face.
     static std::pair<double, double> impulse(const Nodes& carrier, const FacePair& p, double dv)
     {
+        if (!(carrier.mass[p.low] > 0 && carrier.mass[p.high] > 0))
+            return {0, 0};
         const double a = 1 - p.share, b = p.share;
-        const double compliance = a * a * inverse_mass(carrier, p.low) + b * b * inverse_mass(carrier, p.high);
-        const double size = compliance > 0 ? dv / compliance : 0;
-        return {carrier.mass[p.low] > 0 ? a * size : 0, carrier.mass[p.high] > 0 ? b * size : 0};
+        const double size = dv / (a * a / carrier.mass[p.low] + b * b / carrier.mass[p.high]);
+        return {a * size, b * size};
     }
 };
 
@@ -78,7 +84,7 @@ struct Restraint
 {
     std::string name;
     ComponentRestraint x, y;
-    Vec2 reaction{0, 0};  ///< on the soil [N/m]
+    Vec2 reaction{0, 0};  ///< on the soil, from its forces, without damping and without the confining pressure [N/m]
 
     void drive(const Nodes& carrier, std::vector<double>& vx, std::vector<double>& vy) const
     {

@@ -146,6 +146,18 @@ void check_inclusion(const Scene& scene, const BodySpec& body, const std::string
         return problems.add(key + ".inside", fmt::format("no body '{}' that could hold an inclusion", body.inside) +
                                                  (names.empty() ? "" : suggestion(body.inside, names)));
     const BodySpec& host = scene.body(body.inside);
+    const std::vector<Vec2> own = fill(scene, body);
+    for (const BodySpec& other : scene.bodies)
+    {
+        if (&other == &body)
+            break;
+        if (other.inside != body.inside)
+            continue;
+        for (const Vec2& p : own)
+            if (contains(other, p))
+                return problems.add(key,
+                                    fmt::format("inclusion '{}' overlaps inclusion '{}' at ({}, {}) m", body.name, other.name, p[0], p[1]));
+    }
     for (const Vec2& corner : outline(body))
         if (!contains(host, corner, 1e-6 * scene.grid.cell_size))
             return problems.add(
@@ -440,6 +452,13 @@ void check_limits(const Scene& scene, Problems& problems)
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
         if (scene.bodies[k].initial_stress && find_variant(scene.method).family == "fem")
             problems.warn(fmt::format("body[{}].initial_stress", k), "the FEM reference starts without stress: it is left out");
+    if (scene.confinement && scene.confinement->pressure > 0)
+        for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+            if (!scene.bodies[k].initial_stress)
+                problems.warn(fmt::format("body[{}].initial_stress", k),
+                              "missing: the confining pressure hits a body without stress at once");
+    if (scene.confinement && find_variant(scene.method).family == "fem")
+        problems.warn("confinement", "the FEM reference leaves it out, as it does the initial stress that balances it");
     if (!scene.tractions.empty() && find_variant(scene.method).family == "lpfdm" && scene.lpfdm.support == "domain")
         problems.warn("traction",
                       "domains reach into the cells outside a loaded face, and what they hold there may run away; use [confinement] "

@@ -32,14 +32,15 @@ void Wall::begin_step(double t, double dt, Restraint& restraint)
     if (!velocity_)
         return;
     const Vec2 v = (*velocity_)({.t = t + 0.5 * dt});
-    restraint.x.velocity = v[0];
-    restraint.y.velocity = v[1];
+    travel_rate_ = v;
+    restraint.x.velocity = spec_.fix == "y" ? 0 : v[0];
+    restraint.y.velocity = spec_.fix == "x" ? 0 : v[1];
 }
 
-void Wall::end_step(double dt, const Restraint& restraint)
+void Wall::end_step(double dt)
 {
-    travel_[0] += dt * restraint.x.velocity;
-    travel_[1] += dt * restraint.y.velocity;
+    for (std::size_t k = 0; k < 2; ++k)
+        travel_[k] += dt * travel_rate_[k];
 }
 
 Wall::Region Wall::region(double t) const
@@ -139,7 +140,8 @@ void Wall::check_on_lattice(const Region& region, double t) const
     const Vec2 extent{lattice_.nx * lattice_.cell_size, lattice_.ny * lattice_.cell_size};
     for (std::size_t k = 0; k < 2; ++k)
         if (region.min[k] < lattice_.origin[k] - reach || region.max[k] > lattice_.origin[k] + extent[k] + reach)
-            throw Diverged(fmt::format("wall '{}' left the lattice at t = {:.6g} s", spec_.name, t));
+            throw Diverged(fmt::format("wall '{}' left the lattice at t = {:.6g} s after a travel of ({:.4g}, {:.4g}) m", spec_.name, t,
+                                       travel_[0], travel_[1]));
 }
 
 std::vector<Vec2> wall_path(const WallSpec& spec, const Constants& constants, double end)

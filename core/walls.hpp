@@ -15,8 +15,9 @@ public:
     /// Sets the restraint to the nodes that the wall covers at time t, and to its velocity in the middle of the coming step.
     /// @throws Diverged if the wall has left the lattice
     void begin_step(double t, double dt, Restraint& restraint);
-    void end_step(double dt, const Restraint& restraint);
+    void end_step(double dt);
 
+    /// Since the start [m].
     const Vec2& displacement() const { return travel_; }
     /// Nodes that the last begin_step() added; not those of the start.
     const std::vector<std::uint32_t>& new_nodes() const { return new_nodes_; }
@@ -37,7 +38,7 @@ private:
     WallSpec spec_;
     Lattice lattice_;
     std::optional<VectorExpression> velocity_;
-    Vec2 travel_{0, 0};
+    Vec2 travel_{0, 0}, travel_rate_{0, 0};
     std::optional<Region> taken_;
     std::vector<std::uint32_t> covered_, new_nodes_;
 };

@@ -117,8 +117,8 @@ void Elasticity::add_support(const std::string& name, const std::string& fix, co
         if ((fix == "xy" || fix == (is_x(dof) ? "x" : "y")) && holds(nodes_[dof]))
         {
             holds_somewhere = true;
-            if (constraints_.is_constrained(dof))
-                continue;  // its reaction counts once
+            for (Support& earlier : supports_)  // a node of two belongs to the later one
+                std::erase(earlier.dofs, dof);
             constraints_.add_line(dof);
             support.dofs.push_back(dof);
         }

@@ -151,6 +151,8 @@ private:
         if (other_bins)
         {
             gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
+            for (const auto n : nodes_.active)  // what is left must not be taken for soil
+                nodes_.mass[n] = nodes_.vx[n] = nodes_.vy[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
             nodes_.active = gather_.active();
         }
         moved_ = false;

@@ -226,6 +226,8 @@ TEST(MohrCoulomb, RandomPaths)
             const double level =
                 std::abs(state.stress.xx) + std::abs(state.stress.yy) + std::abs(state.stress_zz) + std::abs(state.stress.xy) + k.cohesion;
             bad += !(most_critical(state, k.friction, share * k.cohesion) <= 1e-8 * level);
+            bad += !(0.5 * (state.stress.xx + state.stress.yy) + std::hypot(0.5 * (state.stress.xx - state.stress.yy), state.stress.xy) <=
+                     k.tension + 1e-8 * level);
             bad += !(state.plastic_shear_strain >= before.plastic_shear_strain) || !std::isfinite(work);
             least = std::min(least, work - energy(state));
         }
@@ -235,6 +237,43 @@ TEST(MohrCoulomb, RandomPaths)
         {
             EXPECT_GT(state.plastic_shear_strain, 1);
         }
+    }
+}
+
+/// Within the yield surface the law is the hypoelastic one with exact rotation, sigma_zz included.
+TEST(MohrCoulomb, ElasticPartRotates)
+{
+    test::Random random(11);
+    const MohrCoulomb law = law_of(phi, 1e12);
+    State state;
+    HypoelasticExactRotation::State<double> elastic;
+    double zz = 0;
+    for (int n = 0; n < 200; ++n)
+    {
+        const Gradient<> d{random(-1e-2, 1e-2), random(-1e-2, 1e-2), random(-0.1, 0.1), random(-0.1, 0.1)};
+        law.update(state, d);
+        HypoelasticExactRotation{soil}.update(elastic, d);
+        zz += soil.lame() * d.trace();
+        EXPECT_NEAR(state.stress.xx, elastic.stress.xx, 1e-3);
+        EXPECT_NEAR(state.stress.xy, elastic.stress.xy, 1e-3);
+        EXPECT_NEAR(state.stress_zz, zz, 1e-3);
+    }
+}
+
+/// Tension and shear together: from the corner by both flows.
+TEST(MohrCoulombReturn, Corner)
+{
+    const double limit = 2000, psi = 0.2, sf = std::sin(phi), sp = std::sin(psi);
+    const MohrCoulombReturn back(soil, sp, limit);
+    const double low = (limit * (1 + sf) - 2 * c * std::cos(phi)) / (1 - sf);
+    const Principal at{limit, 0.5 * (limit + low), low}, open{1, 0, 0}, shear{1 + sp, 0, -(1 - sp)};
+    test::Random random(12);
+    for (int k = 0; k < 100; ++k)
+    {
+        Principal trial = plus(plus(at, random(1e-6, 1e-5), stiffness_times(open)), random(1e-6, 1e-5), stiffness_times(shear));
+        EXPECT_EQ(back(trial, sf, c), YieldRegion::corner);
+        for (std::size_t i = 0; i < 3; ++i)
+            EXPECT_NEAR(trial[i], at[i], 1e-6);
     }
 }
 

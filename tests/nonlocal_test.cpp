@@ -93,6 +93,18 @@ TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
 {
     const Scene scene = test::load(scene_text(0.4, 1.7, "gauss"));
     EXPECT_TRUE(has_nonlocal_softening(scene));
+    const Lattice lattice = make_lattice(scene.grid);
+    auto bodies = make_bodies(scene, lattice, {});
+    std::vector<double> workspace;
+    bodies[0].bins.rebuild<false>(bodies[0].points, workspace);
+    const auto index = [&](int i, int j) { return lattice.cell(i, j); };
+    Gather gather(lattice.cells());
+    const std::vector<const Bins*> bins{&bodies[0].bins};
+    gather.rebuild<1>(bins, index);
+    bodies[0].points.plastic_shear[700] = 0.01;  // one point: its own strain counts -0.7, the mean next to nothing
+    NonlocalStrain(scene, lattice.cell_size, lattice.cell_stride(), lattice.cells()).apply<PointSupport>(lattice, bodies, gather, index);
+    EXPECT_EQ(bodies[0].points.softening_strain[700], 0);
+    EXPECT_GT(bodies[0].points.softening_strain[704], 0);
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = "gauss"}, 2), std::exp(-1.0));
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = "galavi_schweiger"}, 1), 0.5 * std::exp(-0.25));
 }

@@ -188,6 +188,9 @@ TEST(Inclusion, TakesPointsOfItsHost)
     EXPECT_EQ(host, sorted);
     EXPECT_THROW(test::load(soil + grain, "", {"body.grain.center=[0.5, 1.5]"}), SceneError);
     EXPECT_THROW(test::load(soil + grain, "", {"body.grain.inside=sand"}), SceneError);
+    std::string second = grain;
+    second.replace(second.find("grain"), 5, "other");
+    EXPECT_THROW(test::load(soil + grain + second), SceneError);
 }
 
 TEST(Inclusion, LeavesTheRandomSoilAroundItAsItIs)

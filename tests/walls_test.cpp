@@ -133,6 +133,41 @@ TEST(Wall, ReactionBeforeDamping)
     EXPECT_FALSE(f.ops.records()[0].displacement.has_value());
 }
 
+/// Soil that does not reach the face is left alone.
+TEST(Wall, AGapPassesNothingOn)
+{
+    Fixture f(cap("smooth"));
+    for (int j = 6; j <= f.lattice.ny; ++j)
+        for (int i = 0; i <= f.lattice.nx; ++i)
+            f.nodes.mass[f.lattice.node(i, j)] = 0;
+    f.step(0, 0.1);
+    f.ops.begin_step(0.1, 0.1);  // the lower face is at y = 2.8, between a node with mass and one without
+    EXPECT_EQ(f.column(3)[5], 1);
+}
+
+/// A node of a boundary and of a wall follows the wall, and its reaction is the wall's.
+TEST(Wall, OwnsWhatItDrives)
+{
+    Fixture f("[[boundary]]\nname = \"top\"\nwhere = \"y >= 3\"\nfix = \"y\"\n" + cap("hand_off"));
+    f.ops.begin_step(0, 0.1);
+    const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 6));
+    f.nodes.active = {n};
+    f.nodes.fy[n] = 5;
+    f.ops.apply_forces(f.nodes, 0);
+    EXPECT_EQ(f.ops.records()[0].reaction[1], 0);
+    EXPECT_EQ(f.ops.records()[1].reaction[1], -5);
+    EXPECT_EQ(f.column(3)[6], -2);
+}
+
+/// The velocity is that of the middle of the step: a uniform acceleration is followed exactly.
+TEST(Wall, AcceleratesExactly)
+{
+    Fixture f("[[wall]]\nname = \"w\"\nmin = [0.0, 3.0]\nmax = [4.0, 3.5]\nvelocity = [\"0\", \"-0.8*t\"]\n");
+    for (int n = 0; n < 10; ++n)
+        f.step(0.1 * n, 0.1);
+    EXPECT_NEAR((*f.ops.records()[0].displacement)[1], -0.4, 1e-12);
+}
+
 TEST(Wall, DoorOpensWhenToldTo)
 {
     Fixture f("[[wall]]\nname = \"floor\"\nmin = [0.0, 0.0]\nmax = [4.0, 0.0]\ndoor = [1.0, 2.5]\ndoor_opens = 0.5\n");
