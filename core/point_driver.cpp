@@ -5,6 +5,7 @@
 #include "core/scene_reader.hpp"
 
 #include <ostream>
+#include <sstream>
 
 namespace testbed
 {
@@ -50,8 +51,9 @@ private:
 };
 
 /// The lateral strain increment that leads to the lateral stress `target`: the stress grows with it.
+/// @throws SceneError, beginning with `where`, if none does
 template <class Point>
-double find_lateral_strain(const Point& point, Gradient<> d, double target)
+double find_lateral_strain(const Point& point, Gradient<> d, double target, const std::string& where)
 {
     const auto excess = [&](double xx)
     {
@@ -63,13 +65,15 @@ double find_lateral_strain(const Point& point, Gradient<> d, double target)
         low *= 2;
     for (int k = 0; k < 60 && excess(high) < 0; ++k)
         high *= 2;
+    if (!(excess(low) <= 0 && excess(high) >= 0))
+        throw SceneError(fmt::format("{}: stress_xx = {:.6g} Pa cannot be reached: the law does not carry it", where, target));
     for (int k = 0; k < 200 && high - low > 1e-16 * (std::abs(low) + std::abs(high)); ++k)
         (excess(0.5 * (low + high)) > 0 ? high : low) = 0.5 * (low + high);
     return 0.5 * (low + high);
 }
 
 template <class Law>
-void drive(const Law& law, const PointPathSpec& spec, std::ostream& out)
+void drive(const Law& law, const PointPathSpec& spec, const std::string& path, std::ostream& out)
 {
     DrivenPoint<Law> point(law, spec.initial_stress);
     Gradient<> total;
@@ -83,14 +87,16 @@ void drive(const Law& law, const PointPathSpec& spec, std::ostream& out)
     };
     out << "step,strain_xx,strain_yy,shear_xy,stress_xx,stress_yy,stress_zz,stress_xy,plastic_shear_strain,work\n";
     write();
-    for (const SegmentSpec& segment : spec.segments)
+    for (std::size_t number = 0; number < spec.segments.size(); ++number)
     {
+        const SegmentSpec& segment = spec.segments[number];
         const double n = segment.steps, from = point.now().stress.xx;
         for (int k = 1; k <= segment.steps; ++k)
         {
             Gradient<> d{segment.gradient[0] / n, segment.gradient[1] / n, segment.gradient[2] / n, segment.gradient[3] / n};
             if (segment.stress_xx)
-                d.xx = find_lateral_strain(point, d, from + (*segment.stress_xx - from) * k / n);
+                d.xx = find_lateral_strain(point, d, from + (*segment.stress_xx - from) * k / n,
+                                           fmt::format("{}: segment[{}], step {}", path, number, k));
             const SymTensor<> before = point.now().stress;
             point.advance(d);
             const SymTensor<> after = point.now().stress;
@@ -129,6 +135,10 @@ void check_path(const PointPathSpec& spec, Problems& problems)
     {
         if (spec.segments[k].gradient.size() != 4)
             problems.add(fmt::format("segment[{}].gradient", k), "four numbers are asked: xx, yy, xy, yx");
+        for (const double g : spec.segments[k].gradient)
+            if (std::abs(g) > spec.segments[k].steps)
+                problems.add(fmt::format("segment[{}].gradient", k),
+                             fmt::format("{} in {} steps is a strain above 1 per step", g, spec.segments[k].steps));
         if (spec.segments[k].steps < 1)
             problems.add(fmt::format("segment[{}].steps", k), "at least one step is asked");
     }
@@ -154,6 +164,8 @@ void drive_point(const std::string& path, std::ostream& out)
     const Strength<> strength =
         m.strength ? Strength<>{evaluate_constant(m.strength->cohesion, {}), std::sin(evaluate_constant(m.strength->friction_angle, {}))}
                    : Strength<>{0, 0};
-    std::visit([&](const auto& law) { drive(law, spec, out); }, make_material(m, moduli, strength, spec.cell_size, {}));
+    std::ostringstream whole;  // all of the path or nothing
+    std::visit([&](const auto& law) { drive(law, spec, path, whole); }, make_material(m, moduli, strength, spec.cell_size, {}));
+    out << whole.str();
 }
 }  // namespace testbed

@@ -174,7 +174,7 @@ void check_number(const std::string& text, const std::string& key, IsValid&& is_
         problems.add(key, fmt::format("{}, not {}", rule, value));
 }
 
-void check_strength(const MaterialSpec& m, const std::string& key, Problems& problems)
+void check_strength(const Scene& scene, const MaterialSpec& m, const std::string& key, Problems& problems)
 {
     const auto refuse = [&](bool present, const char* name)
     {
@@ -237,6 +237,9 @@ void check_strength(const MaterialSpec& m, const std::string& key, Problems& pro
         if (s.nonlocal)
         {
             positive(s.nonlocal->internal_length, ".softening.nonlocal.internal_length");
+            if (const double extent = std::max(scene.grid.size[0], scene.grid.size[1]); extent > 0 && s.nonlocal->internal_length > extent)
+                problems.add(key + ".softening.nonlocal.internal_length",
+                             fmt::format("{} m is longer than the lattice, {} m", s.nonlocal->internal_length, extent));
             if (!(s.nonlocal->over_nonlocal >= 1))
                 problems.add(key + ".softening.nonlocal.over_nonlocal",
                              fmt::format("must be at least 1 (nonlocal), above 1 to regularise; not {}", s.nonlocal->over_nonlocal));
@@ -360,7 +363,7 @@ void check_materials(const Scene& scene, Problems& problems, const std::function
                          fmt::format("must lie in (-1, 0.5), not {}: at 0.5 an explicit method has no stable time step", m.poissons_ratio));
         check_number(
             m.youngs_modulus, key + ".youngs_modulus", [](double E) { return E > 0; }, "must be positive", problems);
-        check_strength(m, key, problems);
+        check_strength(scene, m, key, problems);
     }
 }
 

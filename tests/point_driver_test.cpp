@@ -91,6 +91,9 @@ TEST(PointDriver, SaysWhatIsWrong)
     expect(law + "[[segment]]\ngradient = [0.0, 1.0]\n", "four numbers");
     expect(law + "[[segment]]\ngradient = [0.0, 1.0, 0.0, 0.0]\nsteps = 0\n", "at least one step");
     expect(law + "colour = 1\n" + compression, "unknown key");
+    expect(law + "[[segment]]\nsteps = 10\ngradient = [0.0, -4e-3, 0.0, 0.0]\nstress_xx = 1e6\n",
+           "segment[0], step 1: stress_xx = 82000 Pa cannot be reached");
+    expect(law + "[[segment]]\nsteps = 10\ngradient = [0.0, -1e100, 0.0, 0.0]\n", "strain above 1 per step");
     expect("initial_stress = [1.0]\n" + law.substr(law.find("[material]")) + compression, "xx, yy, zz, xy");
     expect(law + "[material.random]\nseed = 1\n" + compression, "no random field");
 }
