@@ -17,8 +17,6 @@ public:
     /// @param strain plastic shear strain at which the residual is reached; crack-band scaling divides it by L / t_sb
     static Softening linear(double residual, double strain) { return {residual, (1 - residual) / strain}; }
 
-    double residual() const { return residual_; }
-
     template <class T>
     T share(const T& strain) const
     {
