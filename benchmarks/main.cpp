@@ -179,12 +179,11 @@ int run(int argc, char** argv)
         check(options, resolved);
     else if (point_command->parsed())
     {
-        std::ostringstream text;
-        drive_point(law, text);
+        const std::string text = drive_point(law);
         if (csv.empty())
-            fmt::print("{}", text.str());
-        else if (!(std::ofstream(csv) << text.str()).flush())
-            throw SceneError(fmt::format("cannot write '{}'", csv));
+            fmt::print("{}", text);
+        else
+            write_text(csv, text);
     }
     else if (doc_command->parsed())
         fmt::print("{}", scene_documentation(table));

@@ -33,19 +33,12 @@ public:
     /// Notes that a point of bin number `b` may have left it. Different bins may be marked by different threads.
     void mark(std::size_t b) { marked_[b] = 1; }
 
-    /// Sorts all points by bin. Returns whether the list of bins is another one than before.
+    /// Sorts the points by bin, the first time all of them, then those of marked bins: the others go where they go as a block.
+    /// Returns whether the list of bins is another one than before.
     /// @param workspace grows to the number of points
     /// @throws Diverged when a point has left the lattice or its position is not finite.
     template <bool has_box>
     bool rebuild(Points& points, std::vector<double>& workspace)
-    {
-        marked_.assign(bins_.size(), 1);
-        return rebuild_marked<has_box>(points, workspace);
-    }
-
-    /// The same when only points of marked bins may have moved to another one: the others go where they go as a block.
-    template <bool has_box>
-    bool rebuild_marked(Points& points, std::vector<double>& workspace)
     {
         std::vector<Bin> before = std::move(bins_);
         const bool is_first = before.empty();

@@ -32,7 +32,7 @@ Lattice make_lattice(const GridSpec& grid);
 /// @throws SceneError when a body has no points or a material parameter is out of range at a point
 std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointNeeds needs);
 
-/// Expression of velocity or position-dependent parameter at the initial position of points.
+/// A vector of two expressions: a velocity, a force, a traction, an exact displacement.
 struct VectorExpression
 {
     Expression x, y;

@@ -8,9 +8,7 @@ double nonlocal_weight(const NonlocalSpec& spec, double r)
     return (spec.weight == "gauss" ? 1 : s) * std::exp(-s * s);
 }
 
-NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size, std::size_t stride, std::size_t entities)
-    : stride_(stride),
-      entities_(entities)
+NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size, std::size_t stride, std::size_t entities) : stride_(stride)
 {
     const NonlocalSpec* spec = nullptr;
     for (const BodySpec& body : scene.bodies)
@@ -25,23 +23,22 @@ NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size, std::size_t
     for (int j = -reach_; j <= reach_; ++j)
         for (int i = -reach_; i <= reach_; ++i)
             weight_.push_back(nonlocal_weight(*spec, cell_size * std::hypot(i, j)));
-    const std::size_t padding = static_cast<std::size_t>(reach_) * (stride_ + 1);
-    volume_.assign(entities_ + 2 * padding, 0.0);
-    strain_.assign(entities_ + 2 * padding, 0.0);
-    mean_.assign(entities_, 0.0);
+    volume_.assign(entities + 2 * padding(), 0.0);
+    strain_.assign(entities + 2 * padding(), 0.0);
+    mean_.assign(entities, 0.0);
 }
 
 void NonlocalStrain::collect(const Gather& gather)
 {
-    const std::size_t padding = static_cast<std::size_t>(reach_) * (stride_ + 1);
+    const std::size_t offset = padding();
     for (const auto e : filled_)
-        volume_[e + padding] = strain_[e + padding] = 0;
+        volume_[e + offset] = strain_[e + offset] = 0;
     filled_ = gather.active();
     gather.sum<2>(partial_,
                   [&](std::size_t e, const std::array<double, 2>& s)
                   {
-                      volume_[e + padding] = s[0];
-                      strain_[e + padding] = s[1];
+                      volume_[e + offset] = s[0];
+                      strain_[e + offset] = s[1];
                   });
 }
 
@@ -49,7 +46,7 @@ void NonlocalStrain::collect(const Gather& gather)
 void NonlocalStrain::average(const std::vector<std::uint32_t>& active)
 {
     const int stride = static_cast<int>(stride_), width = 2 * reach_ + 1;
-    const std::size_t padding = static_cast<std::size_t>(reach_) * (stride_ + 1);
+    const std::size_t offset = padding();
     parallel_for(active.size(),
                  [&](std::size_t a)
                  {
@@ -61,7 +58,7 @@ void NonlocalStrain::average(const std::vector<std::uint32_t>& active)
                      for (int j = -reach_; j <= reach_; ++j)
                      {
                          const double* weight = &weight_[static_cast<std::size_t>((j + reach_) * width + reach_ + from)];
-                         const auto other = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(e + padding) + j * stride + from);
+                         const auto other = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(e + offset) + j * stride + from);
                          for_each_pack(0, count,
                                        [&](std::size_t i, const auto& lanes)
                                        {

@@ -66,9 +66,11 @@ public:
 private:
     void collect(const Gather& gather);
     void average(const std::vector<std::uint32_t>& active);
+    /// Zeros before and after volume_ and strain_, so that the weight may reach beyond the lattice.
+    std::size_t padding() const { return static_cast<std::size_t>(reach_) * (stride_ + 1); }
 
     std::vector<double> over_nonlocal_;  ///< m by body, zero for a body without
-    std::size_t stride_, entities_;
+    std::size_t stride_;
     int reach_;                                   ///< of the weight [cells]
     std::vector<double> weight_;                  ///< (2 reach + 1)^2
     std::vector<double> volume_, strain_, mean_;  ///< by entity; strain: times volume; both padded by the reach of the weight

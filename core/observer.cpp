@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <fmt/format.h>
-#include <set>
 
 namespace testbed
 {
@@ -226,7 +225,7 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     const std::string group = fmt::format("/snapshots/{:04}", snapshot_times_.size());
     file.attribute(group, "time", t);
     file.attribute(group, "step", step);
-    snapshot_fields_.clear();
+    snapshot_fields_.emplace_back();
     const auto write = [&](const char* name, const char* unit, std::size_t columns, auto&& row_of)
     {
         std::vector<double> values;
@@ -237,7 +236,7 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
             values.insert(values.end(), row.begin(), row.end());
         }
         file.dataset(group + "/" + name, unit, values, columns);
-        snapshot_fields_.emplace_back(name);
+        snapshot_fields_.back().emplace_back(name, columns);
     };
     using Row1 = std::array<double, 1>;
     using Row3 = std::array<double, 3>;
@@ -306,8 +305,6 @@ void Observer::write_history(ResultFile& file) const
 
 std::string Observer::xdmf(const std::string& file_name) const
 {
-    static const std::set<std::string> one_column{"volume",           "initial_volume", "mass",          "plastic_shear_strain",
-                                                  "softening_strain", "cohesion",       "friction_angle"};
     std::string name;
     for (const char c : file_name)
         name += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
@@ -327,17 +324,12 @@ std::string Observer::xdmf(const std::string& file_name) const
         text += fmt::format("<Grid Name=\"{:04}\">\n<Time Value=\"{}\"/>\n<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{}\"/>\n"
                             "<Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
                             k, snapshot_times_[k], n, item("position", 3));
-        for (const std::string& field : snapshot_fields_)
-        {
-            const bool tensor = field.ends_with("stress"), scalar = one_column.count(field) > 0;
+        for (const auto& [field, columns] : snapshot_fields_[k])
             text += fmt::format("<Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", field,
-                                tensor   ? "Tensor6"
-                                : scalar ? "Scalar"
-                                         : "Vector",
-                                item(field, tensor   ? 6
-                                            : scalar ? 1
-                                                     : 3));
-        }
+                                columns == 6   ? "Tensor6"
+                                : columns == 3 ? "Vector"
+                                               : "Scalar",
+                                item(field, columns));
         text += fmt::format("<Attribute Name=\"body\" AttributeType=\"Scalar\" Center=\"Node\">{}</Attribute>\n</Grid>\n",
                             item("body", 1, "UInt"));
     }

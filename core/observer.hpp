@@ -73,7 +73,7 @@ private:
     std::map<std::string, std::vector<Series>> supports_;
     std::vector<Probe> probes_;
     std::vector<double> snapshot_times_;
-    std::vector<std::string> snapshot_fields_;
+    std::vector<std::vector<std::pair<std::string, std::size_t>>> snapshot_fields_;  ///< of each snapshot, with their columns
     double gravity_work_ = 0, last_time_ = 0;
     Vec2 last_moment_;
 };

@@ -4,8 +4,7 @@
 #include "core/make_material.hpp"
 #include "core/scene_reader.hpp"
 
-#include <ostream>
-#include <sstream>
+#include <iterator>
 
 namespace testbed
 {
@@ -73,8 +72,9 @@ double find_lateral_strain(const Point& point, Gradient<> d, double target, cons
 }
 
 template <class Law>
-void drive(const Law& law, const PointPathSpec& spec, const std::string& path, std::ostream& out)
+std::string drive(const Law& law, const PointPathSpec& spec, const std::string& path)
 {
+    std::string text = "step,strain_xx,strain_yy,shear_xy,stress_xx,stress_yy,stress_zz,stress_xy,plastic_shear_strain,work\n";
     DrivenPoint<Law> point(law, spec.initial_stress);
     Gradient<> total;
     double work = 0;
@@ -82,10 +82,9 @@ void drive(const Law& law, const PointPathSpec& spec, const std::string& path, s
     const auto write = [&]
     {
         const PointState s = point.now();
-        out << fmt::format("{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", step, total.xx, total.yy,
-                           total.shear(), s.stress.xx, s.stress.yy, s.stress_zz, s.stress.xy, s.plastic_shear_strain, work);
+        fmt::format_to(std::back_inserter(text), "{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", step,
+                       total.xx, total.yy, total.shear(), s.stress.xx, s.stress.yy, s.stress_zz, s.stress.xy, s.plastic_shear_strain, work);
     };
-    out << "step,strain_xx,strain_yy,shear_xy,stress_xx,stress_yy,stress_zz,stress_xy,plastic_shear_strain,work\n";
     write();
     for (std::size_t number = 0; number < spec.segments.size(); ++number)
     {
@@ -106,6 +105,7 @@ void drive(const Law& law, const PointPathSpec& spec, const std::string& path, s
             write();
         }
     }
+    return text;
 }
 
 void check_path(const PointPathSpec& spec, Problems& problems)
@@ -145,7 +145,7 @@ void check_path(const PointPathSpec& spec, Problems& problems)
 }
 }  // namespace
 
-void drive_point(const std::string& path, std::ostream& out)
+std::string drive_point(const std::string& path)
 {
     Problems problems(path);
     PointPathSpec spec;
@@ -164,8 +164,6 @@ void drive_point(const std::string& path, std::ostream& out)
     const Strength<> strength =
         m.strength ? Strength<>{evaluate_constant(m.strength->cohesion, {}), std::sin(evaluate_constant(m.strength->friction_angle, {}))}
                    : Strength<>{0, 0};
-    std::ostringstream whole;  // all of the path or nothing
-    std::visit([&](const auto& law) { drive(law, spec, path, whole); }, make_material(m, moduli, strength, spec.cell_size, {}));
-    out << whole.str();
+    return std::visit([&](const auto& law) { return drive(law, spec, path); }, make_material(m, moduli, strength, spec.cell_size, {}));
 }
 }  // namespace testbed

@@ -4,7 +4,7 @@
 #include "core/material_spec.hpp"
 #include "core/types.hpp"
 
-#include <iosfwd>
+#include <string>
 #include <vector>
 
 namespace testbed
@@ -41,7 +41,7 @@ struct PointPathSpec
     }
 };
 
-/// Reads a path file and writes the stress path as CSV: step, strains, stresses, plastic shear strain, work per volume.
+/// The stress path of a path file as CSV: step, strains, stresses, plastic shear strain, work per volume.
 /// @throws SceneError with file, line and key of what is wrong
-void drive_point(const std::string& path, std::ostream& out);
+std::string drive_point(const std::string& path);
 }  // namespace testbed

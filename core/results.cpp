@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <fmt/format.h>
+#include <fstream>
 #include <hdf5.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -177,6 +178,24 @@ void ResultFile::dataset(const std::string& path, const std::string& unit, std::
 void ResultFile::flush()
 {
     check(H5Fflush(impl_->file, H5F_SCOPE_GLOBAL));
+}
+
+void write_text(const std::filesystem::path& path, const std::string& text)
+{
+    const std::filesystem::path part = path.string() + ".part";
+    std::ofstream file(part);
+    file << text;
+    file.close();
+    std::error_code error;
+    if (file)
+        std::filesystem::rename(part, path, error);
+    if (!file || error)
+    {
+        const int reason = errno;
+        std::error_code ignored;
+        std::filesystem::remove(part, ignored);
+        throw OutputError(fmt::format("cannot write '{}': {}", path.string(), error ? error.message() : std::strerror(reason)));
+    }
 }
 
 void ResultFile::commit()

@@ -2,6 +2,7 @@
 /// The result file (docs/file_formats.md). Written under a name ending in `.part`; commit() makes it whole.
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <span>
@@ -16,6 +17,9 @@ struct OutputError : std::runtime_error
 {
     using std::runtime_error::runtime_error;
 };
+
+/// Writes a whole file or none. @throws OutputError
+void write_text(const std::filesystem::path& path, const std::string& text);
 
 class ResultFile
 {

@@ -192,7 +192,8 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
             continue;
         const Constants constants = scene.expression_constants();
         const Place origin{};
-        file.attribute(group, "cohesion", Expression(m.strength->cohesion, constants)(origin));  // of the mean, where it is a number
+        file.attribute(group, "cohesion",
+                       Expression(m.strength->cohesion, constants)(origin));  // of the mean; where it varies, that of X = Y = 0
         file.attribute(group, "friction_angle", Expression(m.strength->friction_angle, constants)(origin));
         file.attribute(group, "dilatancy_angle", m.strength->dilatancy_angle);
         if (m.random)
@@ -278,22 +279,6 @@ void check_output(const std::filesystem::path& output)
         throw SceneError(fmt::format("cannot write '{}': it exists and is no file", output.string()));
 }
 
-/// Writes a whole file or none. @throws OutputError
-void write_text(const std::filesystem::path& path, const std::string& text)
-{
-    const std::filesystem::path part = path.string() + ".part";
-    std::ofstream file(part);
-    file << text;
-    file.close();
-    std::error_code error;
-    if (file)
-        std::filesystem::rename(part, path, error);
-    if (!file || error)
-    {
-        std::filesystem::remove(part, error);
-        throw OutputError(fmt::format("cannot write '{}'; the result itself is whole", path.string()));
-    }
-}
 }  // namespace
 
 ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)

@@ -1,6 +1,6 @@
 #pragma once
 /// Tractions on faces of boxes. Each point of the outermost row carries the force of its part of the initial face, and passes it
-/// on where its surface is: to the nodes around that place, with the weights with which it moves. Built only where a scene
+/// on where its surface is: to the nodes around that place, bilinearly. Built only where a scene
 /// has them.
 
 #include "core/body.hpp"

@@ -124,13 +124,16 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
                 break;
         }
     }
+    std::vector<std::uint32_t> at_faces;
+    for (const FacePair& p : pairs)
+        at_faces.insert(at_faces.end(), {p.low, p.high});
+    std::sort(at_faces.begin(), at_faces.end());
     for (ComponentRestraint* component : {&restraint.x, &restraint.y})
     {
         if (spec_.fix == (component == &restraint.x ? "y" : "x"))
             continue;
         component->pairs = pairs;
-        std::erase_if(component->nodes, [&](std::uint32_t n)
-                      { return std::any_of(pairs.begin(), pairs.end(), [&](const FacePair& p) { return p.low == n || p.high == n; }); });
+        std::erase_if(component->nodes, [&](std::uint32_t n) { return std::binary_search(at_faces.begin(), at_faces.end(), n); });
     }
 }
 

@@ -48,7 +48,7 @@ public:
     const Matrix& stiffness() const { return stiffness_; }
     const Matrix& consistent_mass() const { return consistent_mass_; }  ///< [kg/m]
     const Vector& lumped_mass() const { return lumped_mass_; }          ///< [kg/m]
-    /// Gravity and body force at time t, in the initial geometry [N/m].
+    /// Gravity, body force and tractions at time t, in the initial geometry [N/m].
     Vector load(double t) const;
     Vector initial_velocity() const;
     /// Zero where a component is held.

@@ -145,7 +145,7 @@ private:
         bool other_bins = false;
         for (Body& body : bodies_)
         {
-            other_bins |= body.bins.template rebuild_marked<Shape::has_box>(body.points, workspace_);
+            other_bins |= body.bins.template rebuild<Shape::has_box>(body.points, workspace_);
             bins.push_back(&body.bins);
         }
         if (other_bins)

@@ -93,7 +93,7 @@ inline constexpr std::size_t sums_of = what == Scatter::momentum_and_force ? 5
 
 /// m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V (sigma + p I) . grad N_i with the confining pressure p, to the blocks
 /// of each bin.
-/// With B-bar the mean in-plane stress works on the cell's dilatation: dual to the strain of gather_strain().
+/// With B-bar the mean in-plane stress works on the cell's dilatation: dual to NodalVelocity::gradient().
 template <class Shape, class Strain, Scatter what>
 void scatter(const Lattice& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial)
 {

@@ -65,8 +65,43 @@ TYPED_TEST(BinsTest, SortsPoints)
     }
     EXPECT_EQ(next, q.count);
     const std::vector<std::uint32_t> before(q.id.data(), q.id.data() + q.count);
+    for (std::size_t b = 0; b < bins.list().size(); ++b)
+        bins.mark(b);
     bins.rebuild<has_box>(q, workspace);
     EXPECT_TRUE(std::equal(before.begin(), before.end(), q.id.data()));
+}
+
+/// A sort of the marked bins alone gives the order of a sort of all.
+TYPED_TEST(BinsTest, SortsWhatIsMarked)
+{
+    constexpr bool has_box = TypeParam::value;
+    Points some = random_points(500, 8), all = random_points(500, 8);
+    Bins bins(lattice), other(lattice);
+    std::vector<double> workspace;
+    bins.rebuild<has_box>(some, workspace);
+    other.rebuild<has_box>(all, workspace);
+    test::Random random(21);
+    for (int round = 0; round < 5; ++round)
+    {
+        for (std::size_t b = 0; b < bins.list().size(); ++b)
+        {
+            other.mark(b);
+            if (b % 3 != static_cast<std::size_t>(round % 3))
+                continue;
+            bins.mark(b);
+            for (std::size_t p = bins.list()[b].begin; p < bins.list()[b].end; ++p)
+            {
+                some.x[p] = all.x[p] = random(-0.9, 1.9);
+                some.y[p] = all.y[p] = random(2.1, 3.9);
+            }
+        }
+        EXPECT_EQ(bins.rebuild<has_box>(some, workspace), other.rebuild<has_box>(all, workspace));
+        ASSERT_EQ(bins.list().size(), other.list().size());
+        for (std::size_t b = 0; b < bins.list().size(); ++b)
+            EXPECT_EQ(bins.list()[b].end, other.list()[b].end);
+        EXPECT_TRUE(std::equal(some.id.data(), some.id.data() + some.count, all.id.data()));
+        EXPECT_TRUE(std::equal(some.x.data(), some.x.data() + some.count, all.x.data()));
+    }
 }
 
 TEST(Bins, RefusePointsOutsideAndNotFinite)

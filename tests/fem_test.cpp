@@ -225,6 +225,69 @@ TEST(FemStatic, ShearCarriesTheLoadAboveIt)
     EXPECT_NEAR(sum / n, rho * 2.0 * (H - 0.5), 0.05 * rho * 2.0 * H);
 }
 
+std::string traction(const std::string& face, double tx, double ty)
+{
+    return fmt::format("[[traction]]\nname = \"{0}\"\nbody = \"block\"\nface = \"{0}\"\ntraction = [\"{1:.17g}\", \"{2:.17g}\"]\n", face,
+                       tx, ty);
+}
+std::string held(const std::string& name, const std::string& where, const std::string& fix)
+{
+    return fmt::format("[[boundary]]\nname = \"{}\"\nwhere = \"{}\"\nfix = \"{}\"\n", name, where, fix);
+}
+void expect_uniform_stress(const FemSolver& solver, const SymTensor<>& s)
+{
+    const Points& q = solver.bodies()[0].points;
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        EXPECT_NEAR(q.sxx[p], s.xx, 1e-6);
+        EXPECT_NEAR(q.syy[p], s.yy, 1e-6);
+        EXPECT_NEAR(q.sxy[p], s.xy, 1e-6);
+    }
+}
+
+/// A uniform stress follows from its tractions, on each pair of faces; the other two are supported.
+TEST(FemStatic, TractionsOnEachFace)
+{
+    const SymTensor<> s{3e3, -5e3, 2e3};
+    const std::string block = soil + box("block", 1, 1, 3, 3);
+    for (const bool high : {true, false})
+    {
+        const double sign = high ? 1 : -1;
+        const std::string loads = traction(high ? "right" : "left", sign * s.xx, 0) + traction(high ? "top" : "bottom", 0, sign * s.yy);
+        const Scene scene =
+            scene_of(block + loads + held("x", high ? "x <= 1" : "x >= 3", "x") + held("y", high ? "y <= 1" : "y >= 3", "y"),
+                     {"fem.analysis=static"});
+        const auto solver = solved(scene);
+        expect_uniform_stress(*solver, {s.xx, s.yy, 0});
+        EXPECT_NEAR(solver->restraints()[0].reaction[0], -sign * 2 * s.xx, 1e-6);
+        EXPECT_NEAR(solver->restraints()[1].reaction[1], -sign * 2 * s.yy, 1e-6);
+    }
+    const std::string shears = traction("right", 0, s.xy) + traction("left", 0, -s.xy) + traction("top", s.xy, 0);
+    const Scene shear_scene = scene_of(block + shears + held("base", "y <= 1", "xy"), {"fem.analysis=static"});
+    const auto sheared = solved(shear_scene);
+    expect_uniform_stress(*sheared, {0, 0, s.xy});
+    EXPECT_NEAR(sheared->restraints()[0].reaction[0], -2 * s.xy, 1e-6);
+}
+
+/// A cap that moves compresses the column by M v t / H, and pushes it.
+TEST(FemStatic, AWallPrescribesItsDisplacement)
+{
+    const double travel = -1e-3;
+    const Scene scene =
+        scene_of(soil + box("column", 0, 0, 2, H) + supports +
+                     "[[wall]]\nname = \"cap\"\nmin = [0.0, 4.0]\nmax = [2.0, 4.0]\nfix = \"y\"\nvelocity = [\"0\", \"-2e-3*t\"]\n",
+                 {"fem.analysis=static"});
+    const auto solver = solved(scene);
+    const double syy = M * travel / H;
+    expect_uniform_stress(*solver, {lame * travel / H, syy, 0});
+    const auto records = solver->restraints();
+    ASSERT_EQ(records.size(), 3u);
+    EXPECT_NEAR(records[0].reaction[1], -2 * syy, 1e-6);  // the base pushes up
+    EXPECT_EQ(records[2].name, "cap");
+    EXPECT_NEAR(records[2].reaction[1], 2 * syy, 1e-6);
+    EXPECT_NEAR((*records[2].displacement)[1], travel, 1e-9);
+}
+
 TEST(FemStatic, LoadIsThatOfTheEndOfTheRamp)
 {
     const auto half = solved(column({"gravity.ramp=2.0"})), full = solved(column({"fem.analysis=static"}));

@@ -8,44 +8,19 @@ using namespace testbed;
 
 namespace
 {
-std::string scene_text(double l, double m, const std::string& weight)
+Scene nonlocal_scene(double l, double m, const std::string& weight)
 {
-    return R"(
-[grid]
-size = [3.0, 3.0]
-cell_size = 0.1
-[time]
-end = 1.0
-[[material]]
-name = "soil"
-law = "mohr_coulomb"
-density = 1000.0
-youngs_modulus = 1e6
-poissons_ratio = 0.2
-[material.strength]
-cohesion = 9800.0
-friction_angle = 0.5
-[material.softening]
-kind = "linear"
-residual = 0.5
-strain = 0.1
-[material.softening.nonlocal]
-internal_length = )" +
-           std::to_string(l) + "\nover_nonlocal = " + std::to_string(m) + "\nweight = \"" + weight + R"("
-[[body]]
-name = "soil"
-material = "soil"
-shape = "box"
-min = [0.2, 0.3]
-max = [2.7, 2.8]
-points_per_cell = 2
-)";
+    const std::string softening = "[material.softening]\nkind = \"linear\"\nresidual = 0.5\nstrain = 0.1\n[material.softening.nonlocal]\n"
+                                  "internal_length = " +
+                                  std::to_string(l) + "\nover_nonlocal = " + std::to_string(m) + "\nweight = \"" + weight + "\"\n";
+    return test::load(test::soil_block({0.2, 0.3}, {2.7, 2.8}, test::strength + softening), "",
+                      {"grid.size=[3.0, 3.0]", "grid.cell_size=0.1", "body.soil.points_per_cell=2"});
 }
 
 template <class Support>
 void check_against_double_sum(const std::string& weight, double tolerance)
 {
-    const Scene scene = test::load(scene_text(0.4, 1.7, weight));
+    const Scene scene = nonlocal_scene(0.4, 1.7, weight);
     const Lattice lattice = make_lattice(scene.grid);
     auto bodies = make_bodies(scene, lattice, {.box = Support::has_box});
     std::vector<double> workspace;
@@ -91,7 +66,7 @@ TEST(Nonlocal, EqualsTheSumOverPoints)
 
 TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
 {
-    const Scene scene = test::load(scene_text(0.4, 1.7, "gauss"));
+    const Scene scene = nonlocal_scene(0.4, 1.7, "gauss");
     EXPECT_TRUE(has_nonlocal_softening(scene));
     const Lattice lattice = make_lattice(scene.grid);
     auto bodies = make_bodies(scene, lattice, {});

@@ -5,7 +5,9 @@
 
 #include <atomic>
 #include <filesystem>
+#include <fmt/format.h>
 #include <fstream>
+#include <gtest/gtest.h>
 #include <unistd.h>
 
 namespace testbed::test
@@ -31,6 +33,47 @@ inline Scene load(const std::string& text, const std::string& method = "", const
 {
     const SceneFile file(text);
     return load_scene(file.path(), method, overrides).scene;
+}
+
+/// Loading the scene fails with a message that holds `message`.
+inline void expect_problem(const std::string& text, const std::vector<std::string>& overrides, const std::string& message)
+{
+    try
+    {
+        load(text, "", overrides);
+        ADD_FAILURE() << "accepted, expected: " << message;
+    }
+    catch (const SceneError& e)
+    {
+        EXPECT_NE(std::string(e.what()).find(message), std::string::npos) << e.what();
+    }
+}
+
+inline const std::string strength = "[material.strength]\ncohesion = 9800.0\nfriction_angle = 0.5\n";
+
+/// A box of soil on a lattice of 4 x 4 m with L = 0.5 m, over 1 s: elastic, or Mohr-Coulomb with the tables `strength`.
+inline std::string soil_block(const Vec2& min, const Vec2& max, const std::string& strength = "")
+{
+    const auto pair = [](const Vec2& v) { return fmt::format("[{}, {}]", v[0], v[1]); };
+    return R"toml(
+[grid]
+size = [4.0, 4.0]
+cell_size = 0.5
+[time]
+end = 1.0
+[[material]]
+name = "soil"
+density = 1000.0
+youngs_modulus = 1e6
+poissons_ratio = 0.2
+law = )toml" +
+           std::string(strength.empty() ? "\"linear_elastic\"\n" : "\"mohr_coulomb\"\n") + strength + R"toml(
+[[body]]
+name = "soil"
+material = "soil"
+shape = "box"
+min = )toml" +
+           pair(min) + "\nmax = " + pair(max) + "\n";
 }
 
 /// Two bodies with random-looking velocities and no constraint; the lattice has room around them.

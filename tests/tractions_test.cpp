@@ -7,37 +7,66 @@ using namespace testbed;
 
 namespace
 {
-const std::string block = R"toml(
-[grid]
-size = [4.0, 4.0]
-cell_size = 0.5
-[time]
-end = 1.0
-[[material]]
-name = "soil"
-law = "linear_elastic"
-density = 1000.0
-youngs_modulus = 1e6
-poissons_ratio = 0.2
-[[body]]
-name = "soil"
-material = "soil"
-shape = "box"
-min = [1.0, 0.0]
-max = [3.0, 2.0]
-points_per_cell = 3
-[[traction]]
-name = "push"
-body = "soil"
-face = "left"
-traction = ["1e4*(1+Y)", "-2e3"]
-)toml";
+/// The block [1, 3] x [1, 3] with a traction on one of its faces.
+Scene loaded(const std::string& face, const std::string& traction)
+{
+    return test::load(test::soil_block({1, 1}, {3, 3}) + "[[traction]]\nname = \"push\"\nbody = \"soil\"\nface = \"" + face +
+                          "\"\ntraction = " + traction + "\n",
+                      "", {"body.soil.points_per_cell=3"});
+}
+
+/// Sums of the forces at the nodes and of their moments about the origin; `off`: of what acts off the line x_k = at.
+struct Sums
+{
+    double fx = 0, fy = 0, moment_x = 0, moment_y = 0, off = 0;
+
+    Sums(const Lattice& lattice, const Nodes& nodes, std::size_t k, double at)
+    {
+        for (std::size_t n = 0; n < lattice.nodes(); ++n)
+        {
+            const Vec2 x = lattice.node_position(n);
+            fx += nodes.fx[n];
+            fy += nodes.fy[n];
+            moment_x += x[1] * nodes.fx[n];
+            moment_y += x[0] * nodes.fy[n];
+            off += std::abs(x[k] - at) > 1e-9 ? std::abs(nodes.fx[n]) + std::abs(nodes.fy[n]) : 0;
+        }
+    }
+};
 }  // namespace
 
-/// The load goes to the nodes of the face, with the right sum and moment, and follows the surface into the next cell.
-TEST(Tractions, ActAtTheSurface)
+/// The load goes to the nodes of the face, with the right sum and moment.
+TEST(Tractions, ActOnEachFace)
 {
-    const Scene scene = test::load(block);
+    struct Face
+    {
+        const char* name;
+        std::size_t normal;
+        double at;
+    };
+    for (const Face& face : {Face{"left", 0, 1}, {"right", 0, 3}, {"bottom", 1, 1}, {"top", 1, 3}})
+        for (const bool box : {false, true})
+        {
+            SCOPED_TRACE(face.name);
+            const Scene scene = loaded(face.name, face.normal == 0 ? "[\"1e4*(1+Y)\", \"-2e3\"]" : "[\"3e3\", \"1e4*(1+X)\"]");
+            const Lattice lattice = make_lattice(scene.grid);
+            const auto bodies = make_bodies(scene, lattice, {.box = box});
+            Nodes nodes(lattice.nodes());
+            std::fill(nodes.mass.begin(), nodes.mass.end(), 1.0);
+            Tractions(scene).apply(lattice, bodies, nodes, 0);
+            const Sums s(lattice, nodes, face.normal, face.at);
+            const double linear = 1e4 * (2 + 4), moment = 1e4 * (4 + 26.0 / 3);  // of 1 + s over s in [1, 3]
+            EXPECT_NEAR(face.normal == 0 ? s.fx : s.fy, linear, 1e-6);
+            EXPECT_NEAR(face.normal == 0 ? s.fy : s.fx, face.normal == 0 ? -2e3 * 2 : 3e3 * 2, 1e-6);
+            EXPECT_NEAR(face.normal == 0 ? s.moment_x : s.moment_y, moment, 1e4 * 0.02);  // by the points' mid-point rule
+            EXPECT_NEAR(s.off, 0, 1e-6);
+        }
+}
+
+/// It follows the surface into the next cell, and is carried by the nodes that have mass.
+TEST(Tractions, FollowTheSurface)
+{
+    const Scene scene = loaded("left", "[\"1e4\", \"0\"]");
     const Lattice lattice = make_lattice(scene.grid);
     for (const bool box : {false, true})
     {
@@ -45,38 +74,18 @@ TEST(Tractions, ActAtTheSurface)
         Nodes nodes(lattice.nodes());
         std::fill(nodes.mass.begin(), nodes.mass.end(), 1.0);
         const Tractions tractions(scene);
-        const auto sums = [&]
-        {
-            std::array<double, 4> s{};  // F_x, F_y, moment, F_x off the face x = 1
-            for (std::size_t n = 0; n < lattice.nodes(); ++n)
-            {
-                const Vec2 x = lattice.node_position(n);
-                s[0] += nodes.fx[n];
-                s[1] += nodes.fy[n];
-                s[2] += x[1] * nodes.fx[n];
-                s[3] += std::abs(x[0] - 1) > 1e-9 ? std::abs(nodes.fx[n]) : 0;
-            }
-            return s;
-        };
-        tractions.apply(lattice, bodies, nodes, 0);
-        const auto s = sums();
-        EXPECT_NEAR(s[0], 1e4 * (2 + 2), 1e-6);
-        EXPECT_NEAR(s[1], -2e3 * 2, 1e-6);
-        EXPECT_NEAR(s[2], 1e4 * (2 + 8.0 / 3), 1e4 * 0.02);  // by the points' mid-point rule
-        EXPECT_NEAR(s[3], 0, 1e-6);
         for (std::size_t p = 0; p < bodies[0].points.count; ++p)
             bodies[0].points.x[p] -= 0.1;  // a fifth of a cell outwards
-        for (std::size_t n = 0; n < lattice.nodes(); ++n)
-            nodes.fx[n] = nodes.fy[n] = 0;
         tractions.apply(lattice, bodies, nodes, 0);
-        EXPECT_NEAR(sums()[3], 0.2 * 4e4, 1e-6);
+        EXPECT_NEAR(Sums(lattice, nodes, 0, 1).off, 0.2 * 2e4, 1e-6);
         for (std::size_t n = 0; n < lattice.nodes(); ++n)
         {
             nodes.mass[n] = lattice.node_position(n)[0] < 0.9 ? 0 : 1;  // the next line of nodes holds nothing yet
             nodes.fx[n] = nodes.fy[n] = 0;
         }
         tractions.apply(lattice, bodies, nodes, 0);
-        EXPECT_NEAR(sums()[0], 4e4, 1e-6);
-        EXPECT_NEAR(sums()[3], 0, 1e-6);
+        const Sums s(lattice, nodes, 0, 1);
+        EXPECT_NEAR(s.fx, 2e4, 1e-6);
+        EXPECT_NEAR(s.off, 0, 1e-6);
     }
 }

@@ -158,4 +158,8 @@ struct VaryingStiffness : Law
         Law::store(q, p, lanes, state);
     }
 };
+
+using LinearElastic = Hypoelastic<NoRotation>;
+using HypoelasticJaumann = Hypoelastic<JaumannRotation>;
+using HypoelasticExactRotation = Hypoelastic<ExactRotation>;
 }  // namespace testbed

@@ -8,10 +8,6 @@
 
 namespace testbed
 {
-using LinearElastic = Hypoelastic<NoRotation>;
-using HypoelasticJaumann = Hypoelastic<JaumannRotation>;
-using HypoelasticExactRotation = Hypoelastic<ExactRotation>;
-
 using Material = std::variant<LinearElastic, HypoelasticJaumann, HypoelasticExactRotation, VaryingStiffness<LinearElastic>,
                               VaryingStiffness<HypoelasticJaumann>, VaryingStiffness<HypoelasticExactRotation>, MohrCoulomb,
                               MohrCoulombField<true, false>, MohrCoulombField<false, true>, MohrCoulombField<true, true>>;

@@ -174,7 +174,8 @@ struct MohrCoulomb
         q.plastic_shear.activate(q.count);
     }
 
-    /// The pure point function: stress after the displacement gradient increment d.
+    /// The pure point function: stress after the displacement gradient increment d, with the law's one strength and softening by
+    /// the point's own strain.
     void update(State<double>& state, const Gradient<double>& d) const
     {
         elastic(state, d);
@@ -206,13 +207,10 @@ protected:
     template <class T>
     void elastic(State<T>& state, const Gradient<T>& d) const
     {
-        SymTensor<T>& s = state.stress;
-        ExactRotation::rotate(s, d.rotation());
-        const T volumetric = T(moduli.lame()) * d.trace(), shear = T(moduli.shear());
-        s.xx += volumetric + T(2.0) * shear * d.xx;
-        s.yy += volumetric + T(2.0) * shear * d.yy;
-        s.xy += shear * d.shear();
-        state.stress_zz += volumetric;
+        HypoelasticExactRotation::State<T> in_plane{state.stress};
+        HypoelasticExactRotation{moduli}.update(in_plane, d);
+        state.stress = in_plane.stress;
+        state.stress_zz += T(moduli.lame()) * d.trace();
     }
 
     /// Whether the stress is admissible, for a double or for each lane of a pack.
