@@ -143,15 +143,15 @@ def _trace(field, x, band, spacing, others):
 def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
     """Up to `most` bands, the strongest first. x (N, 2) initial positions, strain (N,), volume (N,), spacing of points [m].
 
-    Each band is sought outside the strips of those before it; then all are traced where the others do not disturb, twice. A band
-    counts when its mean strain above the background, on its axis, exceeds `share` of the 99th percentile of the strain.
+    Each band is sought outside the strips of those before it; then all are traced where the others do not disturb, twice: the
+    second time with the axes of the first, and only then judged. A band counts when its mean strain above the background, on its
+    axis, exceeds `share` of the 99th percentile of the strain.
     """
     field, bands, free = LinearNDInterpolator(x, strain), [], np.ones(len(x), bool)
-    least = share * np.percentile(strain, 99)
     while len(bands) < most and free.sum() >= 10:
         bands.append(_search(x[free], strain[free], volume[free], spacing))
         free &= np.abs(bands[-1].distance(x)) > 1.5 * bands[-1].width
-    for _ in range(2):
+    for least in (0.0, share * np.percentile(strain, 99)):
         traced = []
         for band in bands:
             others = [b for b in bands if b is not band]
