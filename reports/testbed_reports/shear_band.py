@@ -143,21 +143,22 @@ def _trace(field, x, band, spacing, others):
 def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
     """Up to `most` bands, the strongest first. x (N, 2) initial positions, strain (N,), volume (N,), spacing of points [m].
 
-    Each band is sought outside the strips of those before it; then all are traced where the others do not disturb, twice: the
-    second time with the axes of the first, and only then judged. A band counts when its mean strain above the background, on its
-    axis, exceeds `share` of the 99th percentile of the strain.
+    Each band is sought outside the strips of those before it; then all are traced where the others do not disturb, twice, from
+    normals of several lengths, of which those count on whose axis the strain stands out most. A band counts when its mean strain
+    above the background, on its axis, then exceeds `share` of the 99th percentile of the strain.
     """
     field, bands, free = LinearNDInterpolator(x, strain), [], np.ones(len(x), bool)
     while len(bands) < most and free.sum() >= 10:
         bands.append(_search(x[free], strain[free], volume[free], spacing))
         free &= np.abs(bands[-1].distance(x)) > 1.5 * bands[-1].width
-    for least in (0.0, share * np.percentile(strain, 99)):
+    for _ in range(2):
         traced = []
         for band in bands:
             others = [b for b in bands if b is not band]
             tries = (_trace(field, x, replace(band, half=shorter * band.half), spacing, others) for shorter in SHORTER)
-            traced.append(next((b for b in tries if b is not None and b.strength > least), None))
+            traced.append(max((b for b in tries if b is not None), key=lambda b: b.strength, default=None))
         bands = [band for band in traced if band is not None]
+    bands = [band for band in bands if band.strength > share * np.percentile(strain, 99)]
     return sorted(bands, key=lambda band: -band.strength)
 
 
