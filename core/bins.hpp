@@ -37,7 +37,7 @@ public:
     /// Returns whether the list of bins is another one than before.
     /// @param workspace grows to the number of points
     /// @throws Diverged when a point has left the lattice or its position is not finite.
-    template <bool has_box>
+    template <class Support>
     bool rebuild(Points& points, std::vector<double>& workspace)
     {
         std::vector<Bin> before = std::move(bins_);
@@ -50,7 +50,7 @@ public:
         for (const Bin& b : before)
             slot_[lattice_.cell(b.i, b.j)] = -1;
         bins_.clear();
-        count<has_box>(points, before);
+        count<Support>(points, before);
         order();
         arrange(before);
         marked_.assign(bins_.size(), 0);
@@ -73,7 +73,7 @@ private:
     static constexpr std::uint32_t outside = ~std::uint32_t{0};
 
     /// Counts the points of each bin and lists the bins, in the order in which they are met.
-    template <bool has_box>
+    template <class Support>
     void count(const Points& points, const std::vector<Bin>& before)
     {
         key_.resize(points.count);
@@ -82,7 +82,7 @@ private:
                      {
                          if (marked_[b])
                              for (std::size_t p = before[b].begin; p < before[b].end; ++p)
-                                 key_[p] = key<has_box>(points, p);
+                                 key_[p] = key<Support>(points, p);
                      });
         const auto add = [&](std::size_t cell, std::uint32_t n)
         {
@@ -147,7 +147,7 @@ private:
                     move(p, key_[p], 1);
     }
 
-    template <bool has_box>
+    template <class Support>
     std::uint32_t key(const Points& points, std::size_t p) const
     {
         const double L = lattice_.cell_size;
@@ -155,10 +155,10 @@ private:
         const bool inside = cx >= 0 && cx < lattice_.nx && cy >= 0 && cy < lattice_.ny;  // false for NaN
         if (!inside)
             return outside;
-        if constexpr (!has_box)
+        if constexpr (!Support::has_box)
             if (points.volume.active() && !(points.volume[p] > 0))
                 return outside;
-        if constexpr (has_box)
+        if constexpr (Support::has_box)
         {
             if (!(points.half_x[p] > 0 && points.half_y[p] > 0))
                 return outside;
@@ -166,7 +166,12 @@ private:
             return static_cast<std::uint32_t>(lattice_.cell(static_cast<int>(std::floor(cx - hx + bin_tolerance)),
                                                             static_cast<int>(std::floor(cy - hy + bin_tolerance))));
         }
-        return static_cast<std::uint32_t>(lattice_.cell(static_cast<int>(cx), static_cast<int>(cy)));
+        else
+        {
+            constexpr double half = Support::half_width;
+            return static_cast<std::uint32_t>(
+                lattice_.cell(static_cast<int>(std::floor(cx - half)), static_cast<int>(std::floor(cy - half))));
+        }
     }
 
     [[noreturn]] static void throw_left_lattice(const Points& points, std::size_t p);

@@ -189,6 +189,10 @@ const std::vector<Variant>& variants()
          [](Scene& s) {
              s.mpm = {"linear", "musl", "b_bar", 1.0};
          }},
+        {"mpm-bspline", "mpm", "quadratic B-splines, linear at the edges of the lattice; FLIP, MUSL",
+         [](Scene& s) {
+             s.mpm = {"bspline", "musl", "four_point", 1.0};
+         }},
         {"mpm-cpgimp", "mpm", "contiguous-particle GIMP: each point's box stretches with it; FLIP, MUSL",
          [](Scene& s) {
              s.mpm = {"cpgimp", "musl", "four_point", 1.0};

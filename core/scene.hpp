@@ -272,7 +272,7 @@ struct MpmSpec
     template <class V>
     void describe(V& v)
     {
-        v.choice("shape", shape, {"linear", "cpgimp"}, "nodal shape functions as seen by the points");
+        v.choice("shape", shape, {"linear", "bspline", "cpgimp"}, "nodal shape functions as seen by the points");
         v.choice("scheme", scheme, {"usl", "usf", "musl"}, "stress update last, first, or last with remapped velocity");
         v.choice("strain", strain, {"four_point", "b_bar"}, "strain at each point, or with the cell's mean volumetric strain");
         v.optional("flip", flip, "-", "share of FLIP in the velocity update, the rest is PIC; in [0, 1]");

@@ -1,6 +1,7 @@
 #pragma once
 /// The support of a point: which S x S cells or nodes it touches, and with which weights. In each direction the support begins
-/// at `a` = (corner - bin) / L in [0, 1); a point with a box has `width` = box / L <= 1, others have none.
+/// at `a` = (corner - bin) / L in [0, 1); a point with a box has `width` = box / L <= 1, others have none, but all the same
+/// `half_width` [cells] between the corner and the point.
 
 #include "core/body.hpp"
 #include "core/simd.hpp"
@@ -12,6 +13,7 @@ struct PointSupport
 {
     static constexpr int S = 1;
     static constexpr bool has_box = false;
+    static constexpr double half_width = 0;
 
     template <class T>
     static std::array<T, S> weights(T, T)
@@ -57,7 +59,7 @@ struct BinFrame
     {
         const Pack cx = x * Pack(scale) - Pack(x0), cy = y * Pack(scale) - Pack(y0);
         if constexpr (!Support::has_box)
-            return {cx, cy, Pack(0.0), Pack(0.0)};
+            return {cx - Pack(Support::half_width), cy - Pack(Support::half_width), Pack(0.0), Pack(0.0)};
         else
         {
             const Pack hx = min(lanes.load(&q.half_x[p]) * Pack(scale), Pack(0.5));

@@ -148,7 +148,7 @@ private:
         bool other_bins = false;
         for (Body& body : bodies_)
         {
-            other_bins |= body.bins.template rebuild<Support::has_box>(body.points, workspace_);
+            other_bins |= body.bins.template rebuild<Support>(body.points, workspace_);
             bins.push_back(&body.bins);
         }
         if (other_bins)

@@ -4,6 +4,7 @@
 #include "core/gather.hpp"
 #include "core/nonlocal.hpp"
 #include "core/tractions.hpp"
+#include "mpm/edges.hpp"
 #include "mpm/transfer.hpp"
 
 #include <atomic>
@@ -66,6 +67,7 @@ public:
                        points_to_nodes<Scatter::momentum_and_force>();
                        restrain_mapped_velocity();
                    });
+        fold_forces();
         internal_ = force_norm(nodes_);
         timer_("node operations",
                [&]
@@ -77,6 +79,7 @@ public:
                                                               nodes_.fx[n] += f[0];
                                                               nodes_.fy[n] += f[1];
                                                           });
+                   fold_forces();
                    if (tractions_)
                        tractions_->apply(lattice_, bodies_, nodes_, t);
                    node_ops_.apply_forces(nodes_, t);
@@ -104,6 +107,7 @@ public:
                        }
                        points_to_nodes<Scatter::momentum>();
                        node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
+                       extend(nodes_.vx, nodes_.vy);
                    });
             timer_("points, material", [&] { move_points<true>(carrier_x_, carrier_y_, dt); });
         }
@@ -127,7 +131,7 @@ public:
     }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() +
+        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
                    sizeof(double) +
                (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
@@ -138,6 +142,7 @@ public:
 
 private:
     static constexpr int S = Shape::S;
+    static constexpr bool reaches_beyond = std::is_same_v<Shape, BSplineShape>;  ///< the lattice's edge
 
     void rebuild()
     {
@@ -145,7 +150,7 @@ private:
         bool other_bins = false;
         for (Body& body : bodies_)
         {
-            other_bins |= body.bins.template rebuild<Shape::has_box>(body.points, workspace_);
+            other_bins |= body.bins.template rebuild<Shape>(body.points, workspace_);
             bins.push_back(&body.bins);
         }
         if (other_bins)
@@ -154,6 +159,8 @@ private:
             for (const auto n : nodes_.active)  // what is left must not be taken for soil
                 nodes_.mass[n] = nodes_.vx[n] = nodes_.vy[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
             nodes_.active = gather_.active();
+            if constexpr (reaches_beyond)
+                edges_.rebuild(lattice_, nodes_.active);
         }
         moved_ = false;
     }
@@ -176,9 +183,10 @@ private:
                            if constexpr (what != Scatter::force)
                            {
                                nodes_.mass[i] = s[0];
-                               const double inverse = inverse_mass(nodes_, i);
-                               nodes_.vx[i] = s[1] * inverse;
-                               nodes_.vy[i] = s[2] * inverse;
+                               nodes_.vx[i] = s[1];
+                               nodes_.vy[i] = s[2];
+                               if constexpr (!reaches_beyond)
+                                   to_velocity(i);
                            }
                            if constexpr (what != Scatter::momentum)
                            {
@@ -186,13 +194,43 @@ private:
                                nodes_.fy[i] = s[Q - 1];
                            }
                        });
+        if constexpr (reaches_beyond && what != Scatter::force)
+        {
+            edges_.fold_mass(nodes_.mass);
+            edges_.fold(nodes_.vx);
+            edges_.fold(nodes_.vy);
+            parallel_for(nodes_.active.size(), [&](std::size_t a) { to_velocity(nodes_.active[a]); });
+        }
+    }
+    void to_velocity(std::size_t i)
+    {
+        const double inverse = inverse_mass(nodes_, i);
+        nodes_.vx[i] *= inverse;
+        nodes_.vy[i] *= inverse;
+    }
+    void fold_forces()
+    {
+        if constexpr (reaches_beyond)
+        {
+            edges_.fold(nodes_.fx);
+            edges_.fold(nodes_.fy);
+        }
+    }
+    /// Values beyond the edge of the lattice, where the shapes reach there.
+    void extend(std::vector<double>& x, std::vector<double>& y)
+    {
+        if constexpr (reaches_beyond)
+        {
+            edges_.extend(x);
+            edges_.extend(y);
+        }
     }
 
     /// Supports and walls prescribe the velocity; the mapped one is kept, because the points feel the difference.
     void restrain_mapped_velocity()
     {
         if (!node_ops_.restrains())
-            return;
+            return extend(nodes_.vx, nodes_.vy);
         mapped_x_.resize(nodes_.vx.size());
         mapped_y_.resize(nodes_.vy.size());
         for (const auto n : nodes_.active)
@@ -201,6 +239,7 @@ private:
             mapped_y_[n] = nodes_.vy[n];
         }
         node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
+        extend(nodes_.vx, nodes_.vy);
     }
 
     /// v += F / m dt; from here on the force holds the increment of the velocity.
@@ -217,6 +256,8 @@ private:
                          nodes_.fx[i] = restrained ? nodes_.vx[i] - mapped_x_[i] : nodes_.fx[i] * step;
                          nodes_.fy[i] = restrained ? nodes_.vy[i] - mapped_y_[i] : nodes_.fy[i] * step;
                      });
+        extend(nodes_.vx, nodes_.vy);
+        extend(nodes_.fx, nodes_.fy);
     }
 
     /// kernel(body, law, bin, frame) for every bin of every body.
@@ -319,6 +360,7 @@ private:
     NodeOps node_ops_;
     Nodes nodes_;
     Gather gather_;
+    LatticeEdges edges_;  ///< empty where shapes end at the edge
     MpmSpec options_;
     std::vector<double> workspace_;  ///< sums of bins, and the way of a field to its new order
     std::vector<double> carrier_x_, carrier_y_;
@@ -336,6 +378,8 @@ std::unique_ptr<Solver> make_mpm(const Scene& scene)
 {
     if (scene.mpm.shape == "cpgimp")
         return std::make_unique<Mpm<GimpShape, PointStrain>>(scene);
+    if (scene.mpm.shape == "bspline")
+        return std::make_unique<Mpm<BSplineShape, PointStrain>>(scene);
     if (scene.mpm.strain == "b_bar")
         return std::make_unique<Mpm<LinearShape, BBarStrain>>(scene);
     return std::make_unique<Mpm<LinearShape, PointStrain>>(scene);

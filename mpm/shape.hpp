@@ -11,6 +11,7 @@ struct LinearShape
 {
     static constexpr int S = 2;
     static constexpr bool has_box = false;
+    static constexpr double half_width = 0;
 
     template <class T>
     static std::array<T, S> weights(T a, T)
@@ -43,6 +44,27 @@ struct GimpShape
     {
         const T second = above(a + width - T(1.0), bin_tolerance) / width, first = T(1.0) - second;
         return {-first, first - second, second};
+    }
+};
+
+/// Quadratic B-spline about each node, evaluated at the point (Steffen, Kirby & Berzins 2008). At the edge of the lattice see
+/// LatticeEdges.
+struct BSplineShape
+{
+    static constexpr int S = 3;
+    static constexpr bool has_box = false;
+    static constexpr double half_width = 0.5;
+
+    template <class T>
+    static std::array<T, S> weights(T a, T)
+    {
+        const T low = T(0.5) * (T(1.0) - a) * (T(1.0) - a), high = T(0.5) * a * a;
+        return {low, T(1.0) - low - high, high};
+    }
+    template <class T>
+    static std::array<T, S> slopes(T a, T)
+    {
+        return {a - T(1.0), T(1.0) - T(2.0) * a, a};
     }
 };
 }  // namespace testbed

@@ -1,4 +1,5 @@
 #include "core/gather.hpp"
+#include "mpm/shape.hpp"
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>
@@ -35,17 +36,16 @@ template <class T>
 class BinsTest : public testing::Test
 {
 };
-using HasBox = testing::Types<std::false_type, std::true_type>;
-TYPED_TEST_SUITE(BinsTest, HasBox);
+using Supports = testing::Types<PointSupport, DomainSupport, BSplineShape>;
+TYPED_TEST_SUITE(BinsTest, Supports);
 
 /// Each point lies in the bin of its support's corner, all fields move together, none is lost, and a second sort changes nothing.
 TYPED_TEST(BinsTest, SortsPoints)
 {
-    constexpr bool has_box = TypeParam::value;
     Points q = random_points(500, 8);
     Bins bins(lattice);
     std::vector<double> workspace;
-    bins.rebuild<has_box>(q, workspace);
+    bins.rebuild<TypeParam>(q, workspace);
     std::vector<bool> seen(q.count, false);
     std::size_t next = 0;
     for (const Bin& b : bins.list())
@@ -55,7 +55,9 @@ TYPED_TEST(BinsTest, SortsPoints)
         next = b.end;
         for (std::size_t p = b.begin; p < b.end; ++p)
         {
-            const double hx = has_box ? std::min(q.half_x[p], 0.25) : 0, hy = has_box ? std::min(q.half_y[p], 0.25) : 0;
+            const double h = std::is_same_v<TypeParam, BSplineShape> ? 0.25 : 0;
+            const double hx = TypeParam::has_box ? std::min(q.half_x[p], 0.25) : h;
+            const double hy = TypeParam::has_box ? std::min(q.half_y[p], 0.25) : h;
             EXPECT_EQ(b.i, std::floor((q.x[p] - hx + 1) / 0.5));
             EXPECT_EQ(b.j, std::floor((q.y[p] - hy - 2) / 0.5));
             EXPECT_DOUBLE_EQ(q.sxx[p], q.x[p] + 100 * q.y[p]);
@@ -67,19 +69,18 @@ TYPED_TEST(BinsTest, SortsPoints)
     const std::vector<std::uint32_t> before(q.id.data(), q.id.data() + q.count);
     for (std::size_t b = 0; b < bins.list().size(); ++b)
         bins.mark(b);
-    bins.rebuild<has_box>(q, workspace);
+    bins.rebuild<TypeParam>(q, workspace);
     EXPECT_TRUE(std::equal(before.begin(), before.end(), q.id.data()));
 }
 
 /// A sort of the marked bins alone gives the order of a sort of all.
 TYPED_TEST(BinsTest, SortsWhatIsMarked)
 {
-    constexpr bool has_box = TypeParam::value;
     Points some = random_points(500, 8), all = random_points(500, 8);
     Bins bins(lattice), other(lattice);
     std::vector<double> workspace;
-    bins.rebuild<has_box>(some, workspace);
-    other.rebuild<has_box>(all, workspace);
+    bins.rebuild<TypeParam>(some, workspace);
+    other.rebuild<TypeParam>(all, workspace);
     test::Random random(21);
     for (int round = 0; round < 5; ++round)
     {
@@ -95,7 +96,7 @@ TYPED_TEST(BinsTest, SortsWhatIsMarked)
                 some.y[p] = all.y[p] = random(2.1, 3.9);
             }
         }
-        EXPECT_EQ(bins.rebuild<has_box>(some, workspace), other.rebuild<has_box>(all, workspace));
+        EXPECT_EQ(bins.rebuild<TypeParam>(some, workspace), other.rebuild<TypeParam>(all, workspace));
         ASSERT_EQ(bins.list().size(), other.list().size());
         for (std::size_t b = 0; b < bins.list().size(); ++b)
             EXPECT_EQ(bins.list()[b].end, other.list()[b].end);
@@ -112,15 +113,15 @@ TEST(Bins, RefusePointsOutsideAndNotFinite)
     {
         Points q = random_points(10, 9);
         q.x[4] = x;
-        EXPECT_THROW(bins.rebuild<false>(q, workspace), Diverged) << x;
+        EXPECT_THROW(bins.rebuild<PointSupport>(q, workspace), Diverged) << x;
     }
     Points turned = random_points(10, 9);
     turned.volume.activate(10, 1.0);
     turned.volume[4] = -1e-9;  // turned inside out
-    EXPECT_THROW(bins.rebuild<false>(turned, workspace), Diverged);
+    EXPECT_THROW(bins.rebuild<PointSupport>(turned, workspace), Diverged);
     Points q = random_points(10, 9);
     q.half_y[4] = -0.1;  // an inverted box
-    EXPECT_THROW(bins.rebuild<true>(q, workspace), Diverged);
+    EXPECT_THROW(bins.rebuild<DomainSupport>(q, workspace), Diverged);
 }
 
 /// Sums over blocks, against adding each block to a map.
@@ -129,8 +130,8 @@ TEST(Gather, AddsTheBlocksOfEachNode)
     Points a = random_points(200, 10), b = random_points(50, 11);
     Bins bins_a(lattice), bins_b(lattice);
     std::vector<double> workspace;
-    bins_a.rebuild<true>(a, workspace);
-    bins_b.rebuild<true>(b, workspace);
+    bins_a.rebuild<DomainSupport>(a, workspace);
+    bins_b.rebuild<DomainSupport>(b, workspace);
     Gather gather(lattice.nodes());
     const std::vector<const Bins*> all{&bins_a, &bins_b};
     const auto node = [](int i, int j) { return lattice.node(i, j); };

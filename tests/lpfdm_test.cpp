@@ -40,7 +40,7 @@ struct RandomState
         {
             Points& q = body.points;
             random.points(q);
-            body.bins.rebuild<Support::has_box>(q, workspace);
+            body.bins.rebuild<Support>(q, workspace);
             bins.push_back(&body.bins);
         }
         grid.rebuild<Support::S>(bins);
@@ -132,7 +132,7 @@ TEST(Forces, PatchOfShiftedPoints)
                     q.half_y[p] *= stretch;
                 }
             }
-            bodies[0].bins.template rebuild<Support::has_box>(q, workspace);
+            bodies[0].bins.template rebuild<Support>(q, workspace);
             const Bins* bins = &bodies[0].bins;
             grid.template rebuild<Support::S>({&bins, 1});
             make_room(workspace, grid.gather.blocks() * 4);

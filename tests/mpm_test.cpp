@@ -1,3 +1,4 @@
+#include "mpm/edges.hpp"
 #include "mpm/mpm.hpp"
 #include "mpm/transfer.hpp"
 #include "tests/oracle.hpp"
@@ -22,7 +23,7 @@ void check_virtual_work()
         Points& q = body.points;
         random.points(q);
         std::vector<double> workspace;
-        body.bins.rebuild<Shape::has_box>(q, workspace);
+        body.bins.rebuild<Shape>(q, workspace);
         Gather gather(lattice.nodes());
         const Bins* bins = &body.bins;
         gather.rebuild<Shape::S>({&bins, 1}, [&](int i, int j) { return lattice.node(i, j); });
@@ -68,6 +69,142 @@ TEST(MpmForces, VirtualWorkGimp)
     check_virtual_work<GimpShape, PointStrain>();
 }
 
+TEST(MpmForces, VirtualWorkBSpline)
+{
+    check_virtual_work<BSplineShape, PointStrain>();
+}
+
+/// At the edges of the lattice: mass and its first moment are kept, a linear velocity has its gradient, forces are dual to it, and
+/// within half a cell of an edge the shapes are the bilinear ones.
+TEST(MpmShape, BSplineAtTheEdges)
+{
+    const Scene scene = test::load(test::soil_block({0, 0}, {4, 4}));
+    const Lattice lattice = make_lattice(scene.grid);
+    test::Random random(31);
+    auto bodies = make_bodies(scene, lattice, {.velocity = true});
+    Points& q = bodies[0].points;
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        q.x[p] = random(0, 4);
+        q.y[p] = random(0, 4);
+        q.sxx[p] = random(-1, 1);
+        q.syy[p] = random(-1, 1);
+        q.sxy[p] = random(-1, 1);
+    }
+    q.x[0] = 0;  // on an edge
+    q.y[0] = 1;
+    const double xa = q.x[5] = 0.1, ya = q.y[5] = 3.9;
+    std::vector<double> workspace;
+    bodies[0].bins.rebuild<BSplineShape>(q, workspace);
+    Gather gather(lattice.nodes());
+    const Bins* bins = &bodies[0].bins;
+    gather.rebuild<3>({&bins, 1}, [&](int i, int j) { return lattice.node(i, j); });
+    LatticeEdges edges;
+    edges.rebuild(lattice, gather.active());
+
+    const auto sums_of_masses = [&](const std::vector<double>& mass)
+    {
+        std::array<double, 4> s{};  // beyond the edges, in all, first moments
+        for (std::size_t n = 0; n < lattice.nodes(); ++n)
+        {
+            const int i = lattice.node_i(n), j = lattice.node_j(n);
+            if (i < 0 || j < 0 || i > lattice.nx || j > lattice.ny)
+                s[0] += std::abs(mass[n]);
+            EXPECT_GE(mass[n], 0) << i << ' ' << j;
+            s[1] += mass[n];
+            s[2] += mass[n] * lattice.node_position(n)[0];
+            s[3] += mass[n] * lattice.node_position(n)[1];
+        }
+        return s;
+    };
+    make_room(workspace, gather.blocks() * 5);
+    scatter<BSplineShape, PointStrain, Scatter::momentum_and_force>(lattice, bodies[0], 0, workspace);
+    std::vector<double> mass(lattice.nodes()), fx(lattice.nodes()), fy(lattice.nodes()), vx(lattice.nodes()), vy(lattice.nodes());
+    gather.sum<5>(workspace,
+                  [&](std::size_t n, const std::array<double, 5>& s)
+                  {
+                      mass[n] = s[0];
+                      fx[n] = s[3];
+                      fy[n] = s[4];
+                  });
+    edges.fold_mass(mass);
+    edges.fold(fx);
+    edges.fold(fy);
+    const auto s = sums_of_masses(mass);
+    double total = 0, mx = 0, my = 0;
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        total += q.mass;
+        mx += q.mass * q.x[p];
+        my += q.mass * q.y[p];
+    }
+    EXPECT_EQ(s[0], 0);
+    EXPECT_NEAR(s[1], total, 1e-12 * total);
+    EXPECT_NEAR(s[2], mx, 1e-12 * mx);
+    EXPECT_NEAR(s[3], my, 1e-12 * my);
+
+    // forces are dual to the gradient of any velocity; that of a linear one is exact
+    for (const bool linear : {true, false})
+    {
+        for (std::size_t n = 0; n < lattice.nodes(); ++n)
+        {
+            const Vec2 x = lattice.node_position(n);
+            vx[n] = linear ? 1 + 2 * x[0] - 3 * x[1] : random(-1, 1);
+            vy[n] = linear ? -2 + 0.5 * x[0] + x[1] : random(-1, 1);
+        }
+        std::vector<double> ux = vx, uy = vy;
+        for (std::size_t n = 0; n < lattice.nodes(); ++n)  // must not matter
+            if (lattice.node_i(n) < 0 || lattice.node_j(n) < 0 || lattice.node_i(n) > lattice.nx || lattice.node_j(n) > lattice.ny)
+                ux[n] = uy[n] = 1e3;
+        edges.extend(ux);
+        edges.extend(uy);
+        double work = 0, nodal = 0;
+        for (std::size_t n = 0; n < lattice.nodes(); ++n)
+            nodal += fx[n] * vx[n] + fy[n] * vy[n];
+        for (const Bin& bin : bodies[0].bins.list())
+        {
+            const BinFrame frame(lattice, bin);
+            const NodalVelocity<3> v(lattice, bin, ux, uy);
+            for (std::size_t p = bin.begin; p < bin.end; ++p)
+            {
+                const ShapeAt<BSplineShape> at(frame.corner<BSplineShape>(q, p, AllLanes{}), frame.scale);
+                const Gradient<Pack> d = v.gradient<PointStrain>(at, PointStrain::InBin<BSplineShape>(lattice, q, bin), 1.0);
+                work += q.volume[p] * (q.sxx[p] * d.xx[0] + q.syy[p] * d.yy[0] + q.sxy[p] * (d.xy[0] + d.yx[0]));
+                if (linear)
+                {
+                    EXPECT_NEAR(d.xx[0], 2, 1e-11);
+                    EXPECT_NEAR(d.xy[0], -3, 1e-11);
+                    EXPECT_NEAR(d.yx[0], 0.5, 1e-11);
+                    EXPECT_NEAR(v.at(at)[0][0], 1 + 2 * q.x[p] - 3 * q.y[p], 1e-11);
+                }
+            }
+        }
+        EXPECT_NEAR(nodal, -work, 1e-10);
+    }
+
+    // one point in a corner
+    Points one = q;
+    std::size_t k = 0;
+    while (one.x[k] != xa || one.y[k] != ya)
+        ++k;
+    const auto weight = [&](int i, int j)
+    {
+        std::vector<double> m(lattice.nodes());
+        const BinFrame frame(lattice, Bin{-1, 7, 0, 1});
+        const Corner c = frame.corner<BSplineShape>(one, k, AllLanes{});
+        const auto wx = BSplineShape::weights(c.ax, c.wx), wy = BSplineShape::weights(c.ay, c.wy);
+        for (int b = 0; b < 3; ++b)
+            for (int a = 0; a < 3; ++a)
+                m[lattice.node(-1 + a, 7 + b)] = wx[a][0] * wy[b][0];
+        edges.fold(m);
+        return m[lattice.node(i, j)];
+    };
+    EXPECT_NEAR(weight(0, 8), 0.8 * 0.8, 1e-14);
+    EXPECT_NEAR(weight(1, 8), 0.2 * 0.8, 1e-14);
+    EXPECT_NEAR(weight(0, 7), 0.8 * 0.2, 1e-14);
+    EXPECT_NEAR(weight(1, 7), 0.2 * 0.2, 1e-14);
+}
+
 struct MpmCase
 {
     const char *method, *scheme;
@@ -86,8 +223,7 @@ TEST_P(MpmOracle, SameTrajectories)
         test::load(test::two_bodies() + "[gravity]\nacceleration = [0.4, -1.3]\n", c.method,
                    {std::string("mpm.scheme=") + c.scheme, "mpm.flip=" + std::to_string(c.flip), "material.stiff.youngs_modulus=3e4"});
     const auto solver = make_mpm(scene);
-    test::RefMpm reference{{0.5, -1, -1}, test::reference_points(scene), scene.mpm.shape == "cpgimp", c.scheme,
-                           c.flip,        scene.mpm.strain == "b_bar"};
+    test::RefMpm reference{{0.5, -1, -1}, test::reference_points(scene), scene.mpm.shape, c.scheme, c.flip, scene.mpm.strain == "b_bar"};
     for (int n = 0; n < 40; ++n)
     {
         solver->prepare(n * 0.01, 0.01);
@@ -97,18 +233,18 @@ TEST_P(MpmOracle, SameTrajectories)
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Variants, MpmOracle,
-                         testing::Values(MpmCase{"mpm-linear", "usl", 1}, MpmCase{"mpm-linear", "musl", 1}, MpmCase{"mpm-linear", "usf", 1},
-                                         MpmCase{"mpm-linear", "musl", 0.9}, MpmCase{"mpm-linear-bbar", "musl", 1},
-                                         MpmCase{"mpm-linear-bbar", "usl", 1}, MpmCase{"mpm-cpgimp", "musl", 1},
-                                         MpmCase{"mpm-cpgimp", "usl", 0.95}, MpmCase{"mpm-cpgimp", "usf", 1}),
-                         [](const auto& info)
-                         {
-                             std::string name =
-                                 std::string(info.param.method) + "_" + info.param.scheme + (info.param.flip < 1 ? "_blend" : "");
-                             std::replace(name.begin(), name.end(), '-', '_');
-                             return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Variants, MpmOracle,
+    testing::Values(MpmCase{"mpm-linear", "usl", 1}, MpmCase{"mpm-linear", "musl", 1}, MpmCase{"mpm-linear", "usf", 1},
+                    MpmCase{"mpm-linear", "musl", 0.9}, MpmCase{"mpm-linear-bbar", "musl", 1}, MpmCase{"mpm-linear-bbar", "usl", 1},
+                    MpmCase{"mpm-cpgimp", "musl", 1}, MpmCase{"mpm-cpgimp", "usl", 0.95}, MpmCase{"mpm-cpgimp", "usf", 1},
+                    MpmCase{"mpm-bspline", "musl", 1}, MpmCase{"mpm-bspline", "usl", 0.95}, MpmCase{"mpm-bspline", "usf", 1}),
+    [](const auto& info)
+    {
+        std::string name = std::string(info.param.method) + "_" + info.param.scheme + (info.param.flip < 1 ? "_blend" : "");
+        std::replace(name.begin(), name.end(), '-', '_');
+        return name;
+    });
 
 TEST(Mpm, SameBitsForAnyThreads)
 {
@@ -127,7 +263,7 @@ TEST(Mpm, SameBitsForAnyThreads)
         set_threads(1);
         return out;
     };
-    for (const char* method : {"mpm-linear", "mpm-linear-bbar", "mpm-cpgimp"})
+    for (const char* method : {"mpm-linear", "mpm-linear-bbar", "mpm-bspline", "mpm-cpgimp"})
         EXPECT_EQ(run(method, 1), run(method, 2)) << method;
 }
 

@@ -239,7 +239,7 @@ struct RefMpm
 {
     RefGrid grid;
     std::vector<RefPoint> points;
-    bool gimp;
+    std::string shape;
     std::string scheme;
     double flip = 1;
     bool b_bar = false;
@@ -272,9 +272,9 @@ struct RefMpm
         const int i0 = static_cast<int>(std::floor(cx)), j0 = static_cast<int>(std::floor(cy));
         const auto one = [&](double c, int i, double h, double& N, double& g)
         {
-            if (gimp)
+            if (shape != "linear")
             {
-                h = std::min(h / L, 0.5);
+                h = shape == "bspline" ? 0.5 : std::min(h / L, 0.5);  // a quadratic B-spline is the mean of a hat over a cell
                 N = (integral(c + h - i) - integral(c - h - i)) / (2 * h);
                 g = (hat(c + h - i) - hat(c - h - i)) / (2 * h) / L;
             }
@@ -284,8 +284,9 @@ struct RefMpm
                 g = (c < i ? 1 : -1) / L;
             }
         };
-        for (int j = j0 - (gimp ? 1 : 0); j <= j0 + (gimp ? 2 : 1); ++j)
-            for (int i = i0 - (gimp ? 1 : 0); i <= i0 + (gimp ? 2 : 1); ++i)
+        const int wide = shape == "linear" ? 0 : 1;
+        for (int j = j0 - wide; j <= j0 + 1 + wide; ++j)
+            for (int i = i0 - wide; i <= i0 + 1 + wide; ++i)
             {
                 double Nx, gx, Ny, gy;
                 one(cx, i, p.hx, Nx, gx);
@@ -294,7 +295,7 @@ struct RefMpm
             }
         return out;
     }
-    double volume(const RefPoint& p) const { return gimp ? 4 * p.hx * p.hy : p.V; }
+    double volume(const RefPoint& p) const { return shape == "cpgimp" ? 4 * p.hx * p.hy : p.V; }
 
     /// Slopes that make the dilatation: of the point, or averaged over its cell with volume as weight.
     std::vector<Vec2> dilatation(std::size_t n) const

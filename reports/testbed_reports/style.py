@@ -14,7 +14,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "<", "p", ">", "*")
 LINES = ("-", "--", "-.", (0, (1, 1)), (0, (5, 1, 1, 1, 1, 1)))
 # Variants that keep their look in every report, whatever else is in it; others follow.
-KNOWN = ("lpfdm", "mpm-linear", "mpm-cpgimp", "fem-q2", "lpfdm-2000", "mpm-linear-bbar", "fem-q1")
+KNOWN = ("lpfdm", "mpm-linear", "mpm-cpgimp", "fem-q2", "lpfdm-2000", "mpm-linear-bbar", "fem-q1", "mpm-bspline")
 EXACT = {"color": "black", "linestyle": "-", "linewidth": 1.6, "alpha": 0.35, "label": "exact"}
 RAIL = "0.45"
 
