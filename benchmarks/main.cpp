@@ -1,3 +1,4 @@
+#include "benchmarks/bench.hpp"
 #include "core/geometry.hpp"
 #include "core/method_limits.hpp"
 #include "core/point_driver.hpp"
@@ -157,6 +158,14 @@ int run(int argc, char** argv)
     point_command->add_option("-o,--output", csv, "write here instead of stdout");
     CLI::App* doc_command = app.add_subcommand("doc", "every table and key of a scene");
     doc_command->add_option("table", table, "only this table");
+    BenchOptions bench_options;
+    CLI::App* bench_command = app.add_subcommand("bench", "speed of the particle methods on this machine");
+    bench_command->add_option("--method", bench_options.methods, "only these methods");
+    bench_command->add_option("--law", bench_options.laws, "elastic, mohr_coulomb")->check(CLI::IsMember({"elastic", "mohr_coulomb"}));
+    bench_command->add_option("--points", bench_options.points, "numbers of points, about")->check(CLI::Range(16.0, 1e9));
+    bench_command->add_option("--threads", bench_options.threads, "default: 1 and all")->check(CLI::Range(1, 1024));
+    bench_command->add_option("--seconds", bench_options.seconds, "of each measurement")->check(CLI::PositiveNumber);
+    bench_command->add_option("-o,--output", bench_options.output, "write a CSV file, too; `testbed report` takes it as bench.csv");
     app.add_subcommand("list", "methods and material laws");
     app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
     app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
@@ -185,6 +194,8 @@ int run(int argc, char** argv)
         else
             write_text(csv, text);
     }
+    else if (bench_command->parsed())
+        bench(bench_options, make_particle_solver);
     else if (doc_command->parsed())
         fmt::print("{}", scene_documentation(table));
     else

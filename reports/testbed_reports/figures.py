@@ -19,6 +19,7 @@ from .power_law import power_law
 from .results import ResultError
 from .style import EXACT, RAIL, WIDTH, frame, legend_below, legend_shape
 from .targets import number
+from .work_precision import work_precision
 
 
 def _triangle(axis, orders, points, x_low, x_high):
@@ -150,64 +151,6 @@ def convergence(study, entry, style):
         notes.append(f"{label} gave no number at {x.rsplit('.', 1)[-1]} = " + ", ".join(f"{v:g}" for v in where)
                      + (" m" if x == "L" else ""))
     return Drawing(figure, runs, list(dict.fromkeys(notes)))
-
-
-def work_precision(study, entry, style):
-    quantity, norm = entry["quantity"], entry.get("norm", "")
-    runs, notes = chosen(study, entry), []
-    series, failing = {}, {}
-    for label, own in by_series(runs, entry, style).items():
-        points, lost = {}, []
-        for run in own:
-            key = tuple((k, str(v)) for k, v in run.values.items() if k not in ("repeat", "dt"))
-            error, seconds = abs(run.value(quantity, norm)), run.value("solve_s")
-            if math.isfinite(error) and seconds > 0:  # an error of zero is exact, not lost
-                points.setdefault(key, []).append((run.values.get("L"), max(error, np.finfo(float).tiny), seconds))
-            elif seconds > 0:
-                lost.append(seconds)
-        rows = [(p[0][0], np.mean([q[1] for q in p]), *np.percentile([q[2] for q in p], [50, 0, 100]))
-                for p in points.values()]
-        series[label] = np.array(sorted(rows, reverse=True), float).reshape(-1, 5)
-        if lost:
-            failing[label] = sorted(lost)
-        without = [r for r in own if not r.value("solve_s") > 0]
-        if without:
-            notes.append(f"{label}: {len(without)} of {len(own)} runs have no result")
-    exact = [label for label, s in series.items() if len(s) and (s[:, 1] < metrics.ROUNDING).all()]
-    exact = [] if len(exact) == sum(len(s) > 0 for s in series.values()) or not metrics.is_error(quantity, norm) else exact
-    finite = np.concatenate([s for label, s in series.items() if len(s) and label not in exact] or [np.empty((0, 5))])
-    if not len(finite):
-        raise FigureError(f"no completed run has {quantity} {norm} and a solve time".replace("  ", " "))
-    width = WIDTH[entry.get("width", "column")]
-    columns, rows = legend_shape([f"{label}: exact (≤ 1.00e-12)" if label in exact else label for label in series], width)
-    figure, axes = frame(width, 2.3, rows, rails=len(failing), left=0.62, right=0.12)
-    axis = axes[0, 0]
-    handles = []
-    for label, data in series.items():
-        text = f"{label}: exact (≤ {number(data[:, 1].max())})" if label in exact else label
-        handles.append(Line2D([], [], **style.of(label), label=text))
-        if label in exact:
-            _floor(axis, data[:, 2], label, style)
-        elif len(data):
-            bars = np.array([data[:, 2] - data[:, 3], data[:, 4] - data[:, 2]])
-            axis.errorbar(data[:, 2], data[:, 1], xerr=bars, **style.of(label), elinewidth=0.7, capsize=1.8)
-    axis.set_xscale("log")
-    axis.set_yscale("log")
-    high = min(finite[:, 1].max(), 10 * finite[finite[:, 0] >= finite[:, 0].max() / 1.001][:, 1].max())
-    if finite[:, 1].max() > 1.6 * high:
-        notes.append("Errors above the upper edge are off the scale")
-    log_y(axis, finite[:, 1].min() / 1.6, high * 1.6)
-    every = np.concatenate([s[:, k] for s in series.values() if len(s) for k in (3, 4)] + list(failing.values()))
-    axis.set_xlim(every.min() / 1.5, every.max() * 1.5)
-    axis.xaxis.set_minor_formatter(NullFormatter())
-    axis.set_xlabel("Solve time [s]")
-    axis.set_ylabel(name_of(quantity, norm))
-    rails(axis, failing, style, "failed")
-    legend_below(figure, handles, columns)
-    if exact:
-        notes.append("Methods that are exact to rounding stand on the lower edge")
-    notes.insert(0, "Medians of repeats with their range; set-up and output are left out")
-    return Drawing(figure, runs, notes)
 
 
 def profile(study, entry, style):

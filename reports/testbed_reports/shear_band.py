@@ -24,13 +24,15 @@ ESTIMATORS = ("std", "integral", "half_max")
 class Band:
     """A straight band: points x with x . normal = offset [m]; `angle` [rad] of the axis from the horizontal.
 
-    `normals`: strain above the background on the normals that the other bands do not touch, (S, K), at distances `d` (K,) [m].
+    `normals`: strain above the background on the normals that the other bands do not touch, (S, K), at distances `d` (K,) [m];
+    not `clear` when there were too few of them, and the clearest were taken.
     """
     angle: float
     offset: float
     half: float
     width: float = math.nan
     strength: float = 0.0
+    clear: bool = True
     d: np.ndarray = None
     normals: np.ndarray = None
 
@@ -82,14 +84,14 @@ def estimate_widths(d, strain):
     return {"std": math.sqrt(12.0 * variance), "integral": total / strain.max(), "half_max": half_max_width(d, strain)}
 
 
-def _search(x, strain, volume, spacing):
+def _search(x, strain, volume, spacing, degrees=range(-89, 91)):
     """The strip with the largest integral of strain above the median over the root of its width: a matched filter on the Radon
-    transform over all angles, which is sharpest when the strip has angle, place and width of a band."""
+    transform over the angles, which is sharpest when the strip has angle, place and width of a band."""
     order = np.argsort(strain)
     weight = np.cumsum(volume[order])
     excess = (strain - strain[order][np.searchsorted(weight, 0.5 * weight[-1])]) * volume
     best = (-math.inf, None)
-    for angle in np.radians(np.arange(-89.0, 91.0)):
+    for angle in np.radians(degrees):
         across = x @ np.array([-math.sin(angle), math.cos(angle)])
         lowest = across.min()
         sums = np.concatenate([[0.0], np.cumsum(np.bincount(((across - lowest) / spacing).astype(int), excess))])
@@ -102,7 +104,7 @@ def _search(x, strain, volume, spacing):
 
 
 def _sample(field, x, band, spacing, others):
-    """(s, d, strain above the background (S, K), background (S,)) on the normals of a band that stay inside the body and clear of
+    """(s, d, strain above the background (S, K), whether all are clear) on the normals of a band that stay inside the body and clear of
     the other bands by their width; of the clearest when those are too few."""
     along = x @ band.tangent
     s = np.arange(along.min(), along.max(), 0.5 * spacing)
@@ -115,16 +117,17 @@ def _sample(field, x, band, spacing, others):
         clearance = np.minimum(clearance, np.abs(other.distance(at)).min(axis=1) / other.width)
     clearance[~inside] = -1.0
     use = np.flatnonzero(clearance > 1.0)
-    if len(use) < FEWEST:
+    clear = len(use) >= FEWEST
+    if not clear:
         use = np.sort(np.argsort(clearance)[::-1][:min(FEWEST, inside.sum())])
     background = strain[use][:, np.abs(d) >= OUTER * band.half].mean(axis=1)
-    return s[use], d, np.clip(strain[use] - background[:, None], 0.0, None), background
+    return s[use], d, np.clip(strain[use] - background[:, None], 0.0, None), clear
 
 
 def _trace(field, x, band, spacing, others):
     """The band with its axis through the centroids of its normals, and its width and strength; None when it has no normals."""
     for _ in range(5):
-        s, d, excess, _ = _sample(field, x, band, spacing, others)
+        s, d, excess, clear = _sample(field, x, band, spacing, others)
         total, top = excess.sum(axis=1), excess.max(axis=1)
         good = (total > 0) & (top > 0.3 * np.median(top)) if len(top) else np.zeros(0, bool)
         if good.sum() < FEWEST:
@@ -135,22 +138,14 @@ def _trace(field, x, band, spacing, others):
         turned = Band(angle, 0.0, 0.0)
         width = half_max_width(d, np.median(excess[good], axis=0))
         band = Band(angle, float(((band.offset + shift) * band.normal) @ turned.normal), max(REACH * width, 3.0 * spacing), width)
-    band.d, band.normals = d, excess[good]
+    band.d, band.normals, band.clear = d, excess[good], clear
     band.strength = float(excess[:, np.abs(d) <= 0.5 * spacing].mean())
     return band
 
 
-def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
-    """Up to `most` bands, the strongest first. x (N, 2) initial positions, strain (N,), volume (N,), spacing of points [m].
-
-    Each band is sought outside the strips of those before it; then all are traced where the others do not disturb, twice, from
-    normals of several lengths, of which those count on whose axis the strain stands out most. A band counts when its mean strain
-    above the background, on its axis, then exceeds `share` of the 99th percentile of the strain.
-    """
-    field, bands, free = LinearNDInterpolator(x, strain), [], np.ones(len(x), bool)
-    while len(bands) < most and free.sum() >= 10:
-        bands.append(_search(x[free], strain[free], volume[free], spacing))
-        free &= np.abs(bands[-1].distance(x)) > 1.5 * bands[-1].width
+def _trace_all(field, x, bands, spacing):
+    """The bands traced where the others do not disturb, twice, from normals of several lengths, of which those count on whose axis the
+    strain stands out most. Bands that have no normals are left out."""
     for _ in range(2):
         traced = []
         for band in bands:
@@ -158,8 +153,29 @@ def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
             tries = (_trace(field, x, replace(band, half=shorter * band.half), spacing, others) for shorter in SHORTER)
             traced.append(max((b for b in tries if b is not None), key=lambda b: b.strength, default=None))
         bands = [band for band in traced if band is not None]
-    bands = [band for band in bands if band.strength > share * np.percentile(strain, 99)]
-    return sorted(bands, key=lambda band: -band.strength)
+    return bands
+
+
+def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
+    """Up to `most` (1 or 2) bands, the strongest first. x (N, 2) initial positions, strain (N,), volume (N,), spacing of points [m].
+
+    The second band is sought among the strips that lean to the other side, as conjugate bands do, which may cross the first one; if
+    there is none, outside the strip of the first. A band counts when its mean strain above the background, on its axis, exceeds `share`
+    of the 99th percentile of the strain.
+    """
+    field, least = LinearNDInterpolator(x, strain), share * np.percentile(strain, 99)
+
+    def strong(bands):
+        return sorted((b for b in _trace_all(field, x, bands, spacing) if b.strength > least), key=lambda b: -b.strength)
+
+    first = _search(x, strain, volume, spacing)
+    if most == 1:
+        return strong([first])
+    conjugate = strong([first, _search(x, strain, volume, spacing, range(-89, 0) if first.angle > 0 else range(1, 90))])
+    free = np.abs(first.distance(x)) > 1.5 * first.width
+    if len(conjugate) == 2 and all(band.clear for band in conjugate) or free.sum() < 10:
+        return conjugate
+    return strong([first, _search(x[free], strain[free], volume[free], spacing)])
 
 
 def widths(band):

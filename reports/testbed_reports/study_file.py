@@ -34,7 +34,7 @@ FIGURE_KEYS = {"kind": TEXT, "name": TEXT, "title": TEXT, "caption": TEXT, "wher
 FIGURE_KINDS = {
     "convergence": ({"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "orders": LIST, "L_from": NUMBER, "L_to": NUMBER}),
     "power_law": ({"quantity": TEXT}, {"norm": TEXT, "L_from": NUMBER, "L_to": NUMBER}),
-    "work_precision": ({"quantity": TEXT}, {"norm": TEXT}),
+    "work_precision": ({"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "y": TEXT, "exact": NUMBER}),
     "profile": ({"component": TEXT}, {"along": TEXT, "panels": TEXT, "L": NUMBER + LIST, "band": LIST,
                                       "snapshot": (int,)}),
     "field": ({}, {"component": TEXT, "L": NUMBER, "range": LIST, "error": FLAG, "columns": (int,), "snapshot": (int,) + LIST,

@@ -11,6 +11,7 @@ from . import metrics
 from .convergence import fit_order, fit_power, pairwise_orders
 from .dataset import groups
 from .targets import digits_of, mean_by_size, number, values_by_size
+from .work_precision import reach
 
 
 @dataclass
@@ -192,6 +193,13 @@ def performance_table(study):
     return Table("performance", "Performance", header, rows, notes=notes)
 
 
+def reach_table(study, entry):
+    """'To reach 1 %, 0.1 %: which method, which L, how long' for a figure of error against time."""
+    header, rows, notes = reach(study, entry)
+    what = entry.get("title") or f"{entry['quantity']} {entry.get('norm', '')}".replace("_", " ").strip()
+    return Table(f"reach_{entry.get('name') or entry['quantity']}", f"To reach an accuracy: {what[:1].lower() + what[1:]}", header, rows, notes=notes)
+
+
 def targets_table(verdicts):
     return Table("targets", "Expectations", ["target", "asked", "measured", "verdict", "note", "source"],
                  [[v.label, v.asked, v.measured, v.verdict, v.note, v.source] for v in verdicts], 6)
@@ -206,4 +214,6 @@ def study_tables(study):
     asked = [entry["quantity"] for entry in study.spec.figures if entry["kind"] == "power_law"]
     asked += [target["quantity"] for target in study.spec.targets if target["kind"].startswith("exponent")]
     tables += [power_law_table(study, quantity) for quantity in dict.fromkeys(asked)] + [performance_table(study)]
+    tables += [reach_table(study, entry) for entry in study.spec.figures if entry["kind"] == "work_precision"
+               and entry.get("x", "solve_s") == "solve_s" and (("exact" in entry) or metrics.is_error(entry["quantity"], entry.get("norm", "")))]
     return [table for table in tables if table]
