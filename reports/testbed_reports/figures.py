@@ -137,7 +137,7 @@ def convergence(study, entry, style):
     span = max(everything) / min(everything)
     axis.set_xlim(min(everything) / span**0.05 / 1.02, max(everything) * span**0.05 * 1.02)
     sizes_axis(axis.xaxis, everything)
-    axis.set_xlabel(X_NAMES.get(x, x))
+    axis.set_xlabel(X_NAMES.get(x, x.rsplit(".", 1)[-1]))
     axis.set_ylabel(name_of(quantity, norm))
     rails(axis, failing, style, "failed")
     legend_below(figure, handles, columns)
