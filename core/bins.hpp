@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 namespace testbed
@@ -29,6 +30,9 @@ public:
     explicit Bins(const Lattice& lattice) : lattice_(lattice), slot_(lattice.cells(), -1) {}
 
     const std::vector<Bin>& list() const { return bins_; }
+    /// The number that bin b had before the last rebuild() if the same points are in it, which then were not marked.
+    std::optional<std::uint32_t> unchanged(std::size_t b) const { return before_[b] == changed ? std::nullopt : std::optional(before_[b]); }
+    std::size_t size_before() const { return size_before_; }
 
     /// Notes that a point of bin number `b` may have left it. Different bins may be marked by different threads.
     void mark(std::size_t b) { marked_[b] = 1; }
@@ -54,6 +58,7 @@ public:
         order();
         arrange(before);
         marked_.assign(bins_.size(), 0);
+        size_before_ = is_first ? 0 : before.size();
         if (!moves_.empty())
         {
             make_room(workspace, points.count);
@@ -66,11 +71,11 @@ public:
     std::size_t bytes() const
     {
         return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + key_.capacity() * sizeof(std::uint32_t) +
-               moves_.capacity() * sizeof(Move) + marked_.capacity();
+               moves_.capacity() * sizeof(Move) + marked_.capacity() + before_.capacity() * sizeof(std::uint32_t);
     }
 
 private:
-    static constexpr std::uint32_t outside = ~std::uint32_t{0};
+    static constexpr std::uint32_t outside = ~std::uint32_t{0}, changed = outside;
 
     /// Counts the points of each bin and lists the bins, in the order in which they are met.
     template <class Support>
@@ -130,6 +135,10 @@ private:
     void arrange(const std::vector<Bin>& before)
     {
         moves_.clear();
+        before_.assign(bins_.size(), changed);
+        for (std::uint32_t b = 0; b < before.size(); ++b)
+            if (!marked_[b])
+                before_[static_cast<std::size_t>(slot_[lattice_.cell(before[b].i, before[b].j)])] = b;
         const auto move = [&](std::uint32_t from, std::size_t cell, std::uint32_t n)
         {
             std::uint32_t& to = bins_[static_cast<std::size_t>(slot_[cell])].end;
@@ -144,7 +153,10 @@ private:
                 move(before[b].begin, lattice_.cell(before[b].i, before[b].j), before[b].end - before[b].begin);
             else
                 for (std::uint32_t p = before[b].begin; p < before[b].end; ++p)
+                {
+                    before_[static_cast<std::size_t>(slot_[key_[p]])] = changed;
                     move(p, key_[p], 1);
+                }
     }
 
     template <class Support>
@@ -182,11 +194,13 @@ private:
     std::vector<std::uint32_t> key_;  ///< cell of each point of a marked bin
     std::vector<Move> moves_;
     std::vector<char> marked_;
+    std::vector<std::uint32_t> before_;  ///< number of each bin before the last rebuild, or `changed`
+    std::size_t size_before_ = 0;
 };
 
 /// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), no longer does; true for NaN.
 template <class T>
-auto left_bin(T a)
+[[gnu::always_inline]] inline auto left_bin(T a)
 {
     return !(a >= T(-bin_tolerance) && a < T(1 - bin_tolerance));
 }

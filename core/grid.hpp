@@ -3,6 +3,8 @@
 /// One ring of cells around the lattice takes what a point's box spreads over its edge, and a second, always empty one lets
 /// every node of the first look at four cells: cells count from -2 and nodes from -1.
 
+#include "core/parallel.hpp"
+#include "core/simd.hpp"
 #include "core/types.hpp"
 
 #include <cstddef>
@@ -30,13 +32,74 @@ struct Lattice
     Vec2 node_position(std::size_t n) const { return {origin[0] + node_i(n) * cell_size, origin[1] + node_j(n) * cell_size}; }
 };
 
-/// Nodal unknowns, and which nodes carry mass at present.
-struct Nodes
+/// Consecutive numbers of cells or nodes, for loops without an index per entity.
+struct Run
 {
+    std::uint32_t begin, count;
+};
+
+/// Runs of an ascending list, none across a multiple of `stride`, short enough to be shared out between threads.
+inline std::vector<Run> runs_of(const std::vector<std::uint32_t>& ascending, std::size_t stride)
+{
+    constexpr std::uint32_t longest = 128;
+    std::vector<Run> runs;
+    for (const auto n : ascending)
+        if (!runs.empty() && runs.back().begin + runs.back().count == n && runs.back().count < longest && n % stride != 0)
+            ++runs.back().count;
+        else
+            runs.push_back({n, 1});
+    return runs;
+}
+
+/// f(run) for all runs.
+template <class F>
+void for_each_run(const std::vector<Run>& runs, F&& f)
+{
+    parallel_for(
+        runs.size(), [&](std::size_t r) { f(runs[r]); }, 16);
+}
+
+/// Nodal unknowns, and which nodes are in use at present.
+class Nodes
+{
+public:
     std::vector<double> mass, vx, vy, fx, fy;  ///< kg/m, m/s, N/m
-    std::vector<std::uint32_t> active;         ///< indices, ascending
 
     explicit Nodes(std::size_t n) : mass(n), vx(n), vy(n), fx(n), fy(n) {}
-    std::size_t bytes() const { return (5 * mass.capacity()) * sizeof(double) + active.capacity() * sizeof(active[0]); }
+    const std::vector<std::uint32_t>& active() const { return active_; }  ///< ascending
+    const std::vector<Run>& runs() const { return runs_; }                ///< the same
+    void set_active(std::vector<std::uint32_t> ascending)
+    {
+        active_ = std::move(ascending);
+        runs_ = runs_of(active_, mass.size() + 1);
+    }
+    /// kernel(i, lanes) for the active nodes [i, i + lanes).
+    template <class Kernel>
+    void for_each(Kernel&& kernel) const
+    {
+        for_each_run(runs_, [&](const Run& run) { for_each_pack(run.begin, run.begin + run.count, kernel); });
+    }
+    std::size_t bytes() const
+    {
+        return 5 * mass.capacity() * sizeof(double) + active_.capacity() * sizeof(active_[0]) + runs_.capacity() * sizeof(Run);
+    }
+
+private:
+    std::vector<std::uint32_t> active_;
+    std::vector<Run> runs_;
 };
+
+/// 1/m, and zero for nodes that carry no mass.
+template <class Lanes>
+Pack inverse_mass(const Nodes& nodes, std::size_t i, const Lanes& lanes)
+{
+    const Pack m = lanes.load(&nodes.mass[i]);
+    Pack inverse = Pack(1.0) / m;
+    stdx::where(!(m > Pack(0.0)), inverse) = Pack(0.0);
+    return inverse;
+}
+inline double inverse_mass(const Nodes& nodes, std::size_t i)
+{
+    return nodes.mass[i] > 0 ? 1 / nodes.mass[i] : 0;
+}
 }  // namespace testbed

@@ -4,6 +4,7 @@
 
 #include "core/types.hpp"
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -52,17 +53,19 @@ inline std::vector<Vec2> polygon_forces(std::span<const Vec2> x, const SymTensor
 }
 
 /// Eqs. (5a)-(5d) on a square cell: nodal values ux[4], uy[4] of a velocity [m/s] or increment [m], scale = dt/(2L) or 1/(2L).
-inline Gradient<> square_gradient(const double (&ux)[4], const double (&uy)[4], double scale)
+template <class T>
+Gradient<T> square_gradient(const std::array<T, 4>& ux, const std::array<T, 4>& uy, T scale)
 {
     return {(ux[1] + ux[3] - ux[0] - ux[2]) * scale, (uy[2] + uy[3] - uy[0] - uy[1]) * scale, (ux[2] + ux[3] - ux[0] - ux[1]) * scale,
             (uy[1] + uy[3] - uy[0] - uy[2]) * scale};
 }
 
 /// Eq. (9) on a square cell: force at node k = 0..3 from the smeared stress s [Pa]; half_side = L/2.
-inline Vec2 square_force(int k, const SymTensor<>& s, double half_side)
+template <class T>
+std::array<T, 2> square_force(int k, const SymTensor<T>& s, double half_side)
 {
-    const double a = (k == 1 || k == 3) ? -half_side : half_side;  // -1/2 (y[k+1] - y[k-1])
-    const double b = (k >= 2) ? -half_side : half_side;            // -1/2 (x[k-1] - x[k+1])
+    const T a((k == 1 || k == 3) ? -half_side : half_side);  // -1/2 (y[k+1] - y[k-1])
+    const T b((k >= 2) ? -half_side : half_side);            // -1/2 (x[k-1] - x[k+1])
     return {s.xx * a + s.xy * b, s.xy * a + s.yy * b};
 }
 }  // namespace testbed

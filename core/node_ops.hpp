@@ -27,14 +27,14 @@ struct Gravity
 
     void apply(Nodes& nodes, double t) const
     {
-        const double f = factor(t), gx = f * acceleration[0], gy = f * acceleration[1];
-        parallel_for(nodes.active.size(),
-                     [&](std::size_t a)
-                     {
-                         const std::size_t i = nodes.active[a];
-                         nodes.fx[i] += gx * nodes.mass[i];
-                         nodes.fy[i] += gy * nodes.mass[i];
-                     });
+        const Pack gx(factor(t) * acceleration[0]), gy(factor(t) * acceleration[1]);
+        nodes.for_each(
+            [&](std::size_t i, const auto& lanes)
+            {
+                const Pack m = lanes.load(&nodes.mass[i]);
+                lanes.store(&nodes.fx[i], lanes.load(&nodes.fx[i]) + gx * m);
+                lanes.store(&nodes.fy[i], lanes.load(&nodes.fy[i]) + gy * m);
+            });
     }
 };
 
@@ -48,16 +48,21 @@ struct LocalDamping
 {
     double alpha;
 
-    double damped(double force, double velocity) const { return force - alpha * std::abs(force) * ((velocity > 0) - (velocity < 0)); }
+    Pack damped(Pack force, Pack velocity) const
+    {
+        Pack resistance = Pack(alpha) * max(force, -force);
+        stdx::where(velocity == Pack(0.0), resistance) = Pack(0.0);
+        stdx::where(velocity < Pack(0.0), resistance) = -resistance;
+        return force - resistance;
+    }
     void apply(Nodes& nodes) const
     {
-        parallel_for(nodes.active.size(),
-                     [&](std::size_t a)
-                     {
-                         const std::size_t i = nodes.active[a];
-                         nodes.fx[i] = damped(nodes.fx[i], nodes.vx[i]);
-                         nodes.fy[i] = damped(nodes.fy[i], nodes.vy[i]);
-                     });
+        nodes.for_each(
+            [&](std::size_t i, const auto& lanes)
+            {
+                lanes.store(&nodes.fx[i], damped(lanes.load(&nodes.fx[i]), lanes.load(&nodes.vx[i])));
+                lanes.store(&nodes.fy[i], damped(lanes.load(&nodes.fy[i]), lanes.load(&nodes.vy[i])));
+            });
     }
 };
 
@@ -106,30 +111,38 @@ private:
 /// Eqs. (12), (14): v += F / m dt.
 inline void accelerate(Nodes& nodes, double dt)
 {
-    parallel_for(nodes.active.size(),
-                 [&](std::size_t a)
-                 {
-                     const std::size_t i = nodes.active[a];
-                     const double step = inverse_mass(nodes, i) * dt;
-                     nodes.vx[i] += nodes.fx[i] * step;
-                     nodes.vy[i] += nodes.fy[i] * step;
-                 });
+    nodes.for_each(
+        [&](std::size_t i, const auto& lanes)
+        {
+            const Pack step = inverse_mass(nodes, i, lanes) * Pack(dt);
+            lanes.store(&nodes.vx[i], lanes.load(&nodes.vx[i]) + lanes.load(&nodes.fx[i]) * step);
+            lanes.store(&nodes.vy[i], lanes.load(&nodes.vy[i]) + lanes.load(&nodes.fy[i]) * step);
+        });
 }
 
 inline double force_norm(const Nodes& nodes)
 {
-    const auto s = ordered_sum<1>(nodes.active.size(),
-                                  [&](std::size_t a)
-                                  {
-                                      const std::size_t i = nodes.active[a];
-                                      return std::array<double, 1>{nodes.fx[i] * nodes.fx[i] + nodes.fy[i] * nodes.fy[i]};
-                                  });
+    const auto& runs = nodes.runs();
+    const auto s = ordered_sum<1>(
+        runs.size(),
+        [&](std::size_t r)
+        {
+            Pack square(0.0);
+            for_each_pack(runs[r].begin, runs[r].begin + runs[r].count,
+                          [&](std::size_t i, const auto& lanes)
+                          {
+                              const Pack fx = lanes.keep(lanes.load(&nodes.fx[i])), fy = lanes.keep(lanes.load(&nodes.fy[i]));
+                              square += fx * fx + fy * fy;
+                          });
+            return std::array<double, 1>{sum(square)};
+        },
+        32);
     return std::sqrt(s[0]);
 }
 
 inline std::size_t nodes_with_mass(const Nodes& nodes)
 {
     return static_cast<std::size_t>(
-        std::count_if(nodes.active.begin(), nodes.active.end(), [&](std::uint32_t i) { return nodes.mass[i] > 0; }));
+        std::count_if(nodes.active().begin(), nodes.active().end(), [&](std::uint32_t i) { return nodes.mass[i] > 0; }));
 }
 }  // namespace testbed

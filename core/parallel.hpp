@@ -24,10 +24,10 @@ inline int threads()
 }
 
 /// f(i) for i in [0, n); iterations must not write to the same place and must not throw.
+/// @param worth_a_team fewer iterations than this are left to one thread
 template <class F>
-void parallel_for(std::size_t n, F&& f)
+void parallel_for(std::size_t n, F&& f, std::size_t worth_a_team = 256)
 {
-    constexpr std::size_t worth_a_team = 256;
     if (detail::team == 1 || n < worth_a_team)
     {
         for (std::size_t i = 0; i < n; ++i)
@@ -39,11 +39,10 @@ void parallel_for(std::size_t n, F&& f)
         f(i);
 }
 
-/// Sum of f(i), an array of K numbers, for i in [0, n), independent of the number of threads.
+/// Sum of f(i), an array of K numbers, for i in [0, n), independent of the number of threads, which take `chunk` at a time.
 template <std::size_t K, class F>
-std::array<double, K> ordered_sum(std::size_t n, F&& f)
+std::array<double, K> ordered_sum(std::size_t n, F&& f, std::size_t chunk = 4096)
 {
-    constexpr std::size_t chunk = 4096;
     const std::size_t chunks = (n + chunk - 1) / chunk;
     std::vector<std::array<double, K>> partial(chunks);
 #pragma omp parallel for schedule(static) num_threads(detail::team) if (chunks > 1)

@@ -8,12 +8,6 @@
 
 namespace testbed
 {
-/// 1/m, and zero for a node that carries no mass.
-inline double inverse_mass(const Nodes& nodes, std::size_t i)
-{
-    return nodes.mass[i] > 0 ? 1 / nodes.mass[i] : 0;
-}
-
 /// Two neighbouring nodes on either side of a wall's face: the velocity interpolated at the face is prescribed.
 struct FacePair
 {

@@ -2,6 +2,7 @@
 /// Packs of points. A kernel is written once as a function of (offset, lanes) and is called for whole packs and for
 /// the rest of a bin, where lanes masks what lies behind its end.
 
+#include <array>
 #include <cstddef>
 #include <experimental/simd>
 
@@ -44,9 +45,17 @@ private:
     Pack::mask_type mask_;
 };
 
+/// Sets packs to zero one by one: a value-initialised array of them becomes a string instruction, which costs more than the sums.
+template <std::size_t N>
+[[gnu::always_inline]] inline void set_zero(std::array<Pack, N>& packs)
+{
+    for (Pack& pack : packs)
+        pack = Pack(0.0);
+}
+
 /// Calls kernel(offset, lanes) for the points [begin, end).
 template <class Kernel>
-void for_each_pack(std::size_t begin, std::size_t end, Kernel&& kernel)
+[[gnu::always_inline]] inline void for_each_pack(std::size_t begin, std::size_t end, Kernel&& kernel)
 {
     std::size_t p = begin;
     for (; p + pack_size <= end; p += pack_size)
@@ -55,38 +64,38 @@ void for_each_pack(std::size_t begin, std::size_t end, Kernel&& kernel)
         kernel(p, SomeLanes(end - p));
 }
 
-inline double sum(Pack v)
+[[gnu::always_inline]] inline double sum(Pack v)
 {
     return stdx::reduce(v);
 }
-inline double sum(double v)
+[[gnu::always_inline]] inline double sum(double v)
 {
     return v;
 }
-inline Pack max(Pack a, Pack b)
+[[gnu::always_inline]] inline Pack max(Pack a, Pack b)
 {
     return stdx::max(a, b);
 }
-inline Pack min(Pack a, Pack b)
+[[gnu::always_inline]] inline Pack min(Pack a, Pack b)
 {
     return stdx::min(a, b);
 }
-inline double max(double a, double b)
+[[gnu::always_inline]] inline double max(double a, double b)
 {
     return a > b ? a : b;
 }
-inline double min(double a, double b)
+[[gnu::always_inline]] inline double min(double a, double b)
 {
     return a < b ? a : b;
 }
 
 /// v where it is larger than the threshold, else zero.
-inline Pack above(Pack v, double threshold)
+[[gnu::always_inline]] inline Pack above(Pack v, double threshold)
 {
     stdx::where(v <= Pack(threshold), v) = Pack(0.0);
     return v;
 }
-inline double above(double v, double threshold)
+[[gnu::always_inline]] inline double above(double v, double threshold)
 {
     return v > threshold ? v : 0.0;
 }

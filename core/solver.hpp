@@ -20,10 +20,10 @@ struct MotionSums
 /// Sums over nodes whose velocity is `lag` seconds behind their forces. @param internal norm of the internal nodal forces
 inline MotionSums nodal_sums(const Lattice& lattice, const Nodes& nodes, double lag, double internal)
 {
-    const auto s = ordered_sum<4>(nodes.active.size(),
+    const auto s = ordered_sum<4>(nodes.active().size(),
                                   [&](std::size_t a)
                                   {
-                                      const std::size_t i = nodes.active[a];
+                                      const std::size_t i = nodes.active()[a];
                                       const Vec2 x = lattice.node_position(i);
                                       const double m = nodes.mass[i], step = inverse_mass(nodes, i) * lag;
                                       const double vx = nodes.vx[i] + nodes.fx[i] * step, vy = nodes.vy[i] + nodes.fy[i] * step;

@@ -16,7 +16,7 @@ struct PointSupport
     static constexpr double half_width = 0;
 
     template <class T>
-    static std::array<T, S> weights(T, T)
+    [[gnu::always_inline]] static std::array<T, S> weights(T, T)
     {
         return {T(1.0)};
     }
@@ -29,9 +29,14 @@ struct DomainSupport
     static constexpr bool has_box = true;
 
     template <class T>
-    static std::array<T, S> weights(T a, T width)
+    [[gnu::always_inline]] static std::array<T, S> weights(T a, T width)
     {
-        const T high = above(a + width - T(1.0), bin_tolerance) / width;
+        return weights_by(a, width, T(1.0) / width);
+    }
+    template <class T>
+    [[gnu::always_inline]] static std::array<T, S> weights_by(T a, T width, T inverse)
+    {
+        const T high = above(a + width - T(1.0), bin_tolerance) * inverse;
         return {T(1.0) - high, high};
     }
 };
@@ -40,6 +45,28 @@ struct DomainSupport
 struct Corner
 {
     Pack ax, ay, wx, wy;
+};
+
+/// Weights in both directions.
+template <class Support>
+struct Weights
+{
+    std::array<Pack, Support::S> x, y;
+
+    [[gnu::always_inline]] explicit Weights(const Corner& c)
+    {
+        if constexpr (std::is_same_v<Support, DomainSupport>)
+        {
+            const Pack inverse = Pack(1.0) / (c.wx * c.wy);  // divisions cost as much as all else
+            x = Support::weights_by(c.ax, c.wx, inverse * c.wy);
+            y = Support::weights_by(c.ay, c.wy, inverse * c.wx);
+        }
+        else
+        {
+            x = Support::weights(c.ax, c.wx);
+            y = Support::weights(c.ay, c.wy);
+        }
+    }
 };
 
 /// Maps points to the coordinates of their bin.
@@ -55,7 +82,7 @@ struct BinFrame
     }
 
     template <class Support, class Lanes>
-    Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    [[gnu::always_inline]] Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
     {
         const Pack cx = x * Pack(scale) - Pack(x0), cy = y * Pack(scale) - Pack(y0);
         if constexpr (!Support::has_box)
@@ -68,16 +95,15 @@ struct BinFrame
         }
     }
     template <class Support, class Lanes>
-    Corner corner(const Points& q, std::size_t p, const Lanes& lanes) const
+    [[gnu::always_inline]] Corner corner(const Points& q, std::size_t p, const Lanes& lanes) const
     {
         return corner<Support>(q, p, lanes, lanes.load(&q.x[p]), lanes.load(&q.y[p]));
     }
-    /// Whether the support of one of the points now begins in another bin, or one of them is turned inside out; the volume must
+    /// Whether the support of one of the points, at c, begins in another bin, or one of them is turned inside out; the volume must
     /// be up to date.
     template <class Support, class Lanes>
-    bool left(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    [[gnu::always_inline]] bool left(const Points& q, std::size_t p, const Lanes& lanes, const Corner& c) const
     {
-        const Corner c = corner<Support>(q, p, lanes, x, y);
         auto out = left_bin(c.ax) || left_bin(c.ay);
         if constexpr (Support::has_box)
             out = out || !(lanes.load(&q.half_x[p]) > Pack(0.0)) || !(lanes.load(&q.half_y[p]) > Pack(0.0));
@@ -89,7 +115,7 @@ struct BinFrame
 
 /// Volume of a pack of points [m^2].
 template <class Support, class Lanes>
-Pack volume(const Points& q, std::size_t p, const Lanes& lanes)
+[[gnu::always_inline]] inline Pack volume(const Points& q, std::size_t p, const Lanes& lanes)
 {
     if constexpr (Support::has_box)
         return Pack(4.0) * lanes.load(&q.half_x[p]) * lanes.load(&q.half_y[p]);
@@ -99,7 +125,7 @@ Pack volume(const Points& q, std::size_t p, const Lanes& lanes)
 
 /// Volume, or box, of a pack of points after the displacement gradient increment d.
 template <class Support, class Lanes>
-void stretch(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d)
+[[gnu::always_inline]] inline void stretch(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d)
 {
     const Pack one(1.0);
     if constexpr (Support::has_box)

@@ -3,21 +3,35 @@
 
 #include "lpfdm/grid.hpp"
 
-#include <cmath>
-
 namespace testbed
 {
+using Velocity = std::array<Pack, 2>;
+
 /// As published: the gradient of the cell that holds the departure point x_k - du; no correction where that cell is empty.
 struct UpwindConvection
 {
     /// Eq. (13) as printed.
-    static Vec2 correct(const Vec2& v, const Gradient<>& g) { return {v[0] - v[0] * g.xx - v[1] * g.xy, v[1] - v[0] * g.yx - v[1] * g.yy}; }
-
-    static Gradient<> gradient(const LpfdmGrid& grid, std::size_t first_cell, double cx, double cy)
+    static Velocity correct(const Velocity& v, const Gradient<Pack>& g)
     {
-        const int k = (cx > 0 ? 1 : 0) + (cy > 0 ? 2 : 0);
-        const std::size_t c = grid.around(first_cell, k);
-        return grid.cells.mass[c] > 0 ? grid.cells.gradient[c] : Gradient<>{};
+        return {v[0] - v[0] * g.xx - v[1] * g.xy, v[1] - v[0] * g.yx - v[1] * g.yy};
+    }
+
+    template <class Lanes>
+    static Gradient<Pack> gradient(const LpfdmGrid& grid, std::size_t first_cell, const Lanes& lanes, Pack cx, Pack cy)
+    {
+        const auto right = cx > Pack(0.0), up = cy > Pack(0.0);
+        Gradient<Pack> g{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
+        for (int k = 0; k < 4; ++k)
+        {
+            const std::size_t c = grid.around(first_cell, k);
+            const auto here = ((k & 1) ? right : !right) && ((k & 2) ? up : !up) && lanes.load(&grid.cells.mass[c]) > Pack(0.0);
+            const Gradient<Pack> at = grid.cells.gradient(c, lanes);
+            stdx::where(here, g.xx) = at.xx;
+            stdx::where(here, g.yy) = at.yy;
+            stdx::where(here, g.xy) = at.xy;
+            stdx::where(here, g.yx) = at.yx;
+        }
+        return g;
     }
 };
 
@@ -28,27 +42,29 @@ struct CentralConvection
 {
     /// The node takes the velocity of what arrives from x - dt v', which for a linear field is (I + G) v' = v. Eq. (13) is its
     /// first order; what it drops adds up to a gain of angular momentum and energy in rotation.
-    static Vec2 correct(const Vec2& v, const Gradient<>& g)
+    static Velocity correct(const Velocity& v, const Gradient<Pack>& g)
     {
-        const double determinant = (1 + g.xx) * (1 + g.yy) - g.xy * g.yx;
-        return {((1 + g.yy) * v[0] - g.xy * v[1]) / determinant, ((1 + g.xx) * v[1] - g.yx * v[0]) / determinant};
+        const Pack one(1.0), inverse = one / ((one + g.xx) * (one + g.yy) - g.xy * g.yx);
+        return {((one + g.yy) * v[0] - g.xy * v[1]) * inverse, ((one + g.xx) * v[1] - g.yx * v[0]) * inverse};
     }
 
-    static Gradient<> gradient(const LpfdmGrid& grid, std::size_t first_cell, double cx, double cy)
+    template <class Lanes>
+    static Gradient<Pack> gradient(const LpfdmGrid& grid, std::size_t first_cell, const Lanes& lanes, Pack cx, Pack cy)
     {
-        Gradient<> mean;
-        double total = 0;
+        const Pack one(1.0);
+        Gradient<Pack> mean{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
+        Pack total(0.0);
         for (int k = 0; k < 4; ++k)
         {
             const std::size_t c = grid.around(first_cell, k);
-            const double w = grid.cells.mass[c] * ((k & 1) ? 1 + cx : 1 - cx) * ((k & 2) ? 1 + cy : 1 - cy);
-            const Gradient<>& g = grid.cells.gradient[c];
-            mean = mean + Gradient<>{w * g.xx, w * g.yy, w * g.xy, w * g.yx};
+            const Pack w = lanes.load(&grid.cells.mass[c]) * ((k & 1) ? one + cx : one - cx) * ((k & 2) ? one + cy : one - cy);
+            const Gradient<Pack> g = grid.cells.gradient(c, lanes);
+            mean = mean + Gradient<Pack>{w * g.xx, w * g.yy, w * g.xy, w * g.yx};
             total += w;
         }
-        if (total <= 0)
-            return {};
-        return {mean.xx / total, mean.yy / total, mean.xy / total, mean.yx / total};
+        Pack inverse = one / total;
+        stdx::where(!(total > Pack(0.0)), inverse) = Pack(0.0);
+        return {mean.xx * inverse, mean.yy * inverse, mean.xy * inverse, mean.yx * inverse};
     }
 };
 
@@ -56,16 +72,15 @@ struct CentralConvection
 template <class Scheme>
 void convect(LpfdmGrid& grid, double dt)
 {
-    const double courant = dt / grid.lattice.cell_size;
-    const auto limited = [&](double v) { return std::fmin(1.0, std::fmax(-1.0, v * courant)); };
+    const Pack courant(dt / grid.lattice.cell_size), one(1.0);
     grid.for_each_node(
-        [&](std::size_t i, std::size_t first_cell)
+        [&](std::size_t n, std::size_t first_cell, const auto& lanes)
         {
-            double &vx = grid.nodes.vx[i], &vy = grid.nodes.vy[i];
-            const Gradient<> g = Scheme::gradient(grid, first_cell, limited(vx), limited(vy));
-            const Vec2 v = Scheme::correct({vx, vy}, g);
-            vx = v[0];
-            vy = v[1];
+            const Velocity v{lanes.load(&grid.nodes.vx[n]), lanes.load(&grid.nodes.vy[n])};
+            const Pack cx = min(one, max(-one, v[0] * courant)), cy = min(one, max(-one, v[1] * courant));
+            const Velocity corrected = Scheme::correct(v, Scheme::gradient(grid, first_cell, lanes, cx, cy));
+            lanes.store(&grid.nodes.vx[n], corrected[0]);
+            lanes.store(&grid.nodes.vy[n], corrected[1]);
         });
 }
 }  // namespace testbed

@@ -1,36 +1,79 @@
 #pragma once
 /// One step of LPFDM, a function for each group of equations of Konagai & Johansson (2000).
 
-#include "core/support.hpp"
+#include "core/bin_sums.hpp"
 #include "lpfdm/grid.hpp"
 
 #include <atomic>
 
 namespace testbed
 {
-/// Eqs. (7), (8): mass and smeared stress (beyond the confining pressure) of each cell. @param workspace room for 4 S^2 numbers per bin
+/// What the points of one bin give to its S x S cells: mass and, times volume, the stress beyond the confining pressure.
 template <class Support>
-void cell_averages(LpfdmGrid& grid, const std::vector<Body>& bodies, std::vector<double>& workspace)
+class CellSums
 {
-    std::size_t first_bin = 0;
-    for (const Body& body : bodies)
+public:
+    static constexpr int S = Support::S;
+    static constexpr std::size_t quantities = 4, numbers = S * S * quantities;
+
+    [[gnu::always_inline]] CellSums(const Lattice&, const Bin&) { set_zero(total_); }
+
+    /// Points [p, p + lanes) of the body, with their support at c.
+    template <class Lanes>
+    [[gnu::always_inline]] void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner& c)
     {
         const Points& q = body.points;
-        spread<Support, 4>(grid.lattice, body, first_bin, workspace,
-                           [&](std::size_t p, const auto& lanes)
-                           {
-                               const Pack v = volume<Support>(q, p, lanes), pressure(body.confinement);
-                               return std::array<Pack, 4>{Pack(q.mass), v * (lanes.load(&q.sxx[p]) + pressure),
-                                                          v * (lanes.load(&q.syy[p]) + pressure), v * lanes.load(&q.sxy[p])};
-                           });
-        first_bin += body.bins.list().size();
+        const Weights<Support> weights(c);
+        const Pack v = lanes.keep(volume<Support>(q, p, lanes)), pressure(body.confinement);
+        const Pack xx = v * (lanes.load(&q.sxx[p]) + pressure), yy = v * (lanes.load(&q.syy[p]) + pressure), xy = v * lanes.load(&q.sxy[p]);
+        for (int j = 0; j < S; ++j)
+            for (int i = 0; i < S; ++i)
+            {
+                Pack* to = &total_[static_cast<std::size_t>(j * S + i) * quantities];
+                if constexpr (S == 1)
+                {
+                    to[1] += xx;
+                    to[2] += yy;
+                    to[3] += xy;
+                }
+                else
+                {
+                    const Pack w = weights.x[i] * weights.y[j];
+                    to[0] += lanes.keep(w);
+                    to[1] += w * xx;
+                    to[2] += w * yy;
+                    to[3] += w * xy;
+                }
+            }
     }
-    const double area = grid.lattice.cell_size * grid.lattice.cell_size;
-    grid.gather.sum<4>(workspace,
+    [[gnu::always_inline]] void write(const Body& body, const Bin& bin, double* to) const
+    {
+        for (std::size_t k = 0; k < S * S; ++k, to += quantities)
+        {
+            to[0] = body.points.mass * (S == 1 ? static_cast<double>(bin.end - bin.begin) : sum(total_[k * quantities]));
+            for (std::size_t n = 1; n < quantities; ++n)
+                to[n] = sum(total_[k * quantities + n]);
+        }
+    }
+
+private:
+    std::array<Pack, numbers> total_;
+};
+
+template <class Support>
+using LpfdmSums = BinSums<Support, CellSums<Support>>;
+
+/// Eqs. (7), (8): mass and smeared stress of each cell, from the sums of the bins.
+inline void cell_averages(LpfdmGrid& grid, const std::vector<double>& sums)
+{
+    const double scale = 1 / (grid.lattice.cell_size * grid.lattice.cell_size);
+    grid.gather.sum<4>(sums,
                        [&](std::size_t c, const std::array<double, 4>& s)
                        {
                            grid.cells.mass[c] = s[0];
-                           grid.cells.stress[c] = {s[1] / area, s[2] / area, s[3] / area};
+                           grid.cells.sxx[c] = s[1] * scale;
+                           grid.cells.syy[c] = s[2] * scale;
+                           grid.cells.sxy[c] = s[3] * scale;
                        });
 }
 
@@ -39,59 +82,58 @@ inline void nodal_forces(LpfdmGrid& grid)
 {
     const double half_side = 0.5 * grid.lattice.cell_size;
     grid.for_each_node(
-        [&](std::size_t i, std::size_t first_cell)
+        [&](std::size_t n, std::size_t first_cell, const auto& lanes)
         {
-            double mass = 0;
-            Vec2 force{0, 0};
+            Pack mass(0.0), fx(0.0), fy(0.0);
             for (int k = 0; k < 4; ++k)
             {
                 const std::size_t c = grid.around(first_cell, k);
-                const Vec2 f = square_force(k, grid.cells.stress[c], half_side);
-                mass += grid.cells.mass[c];
-                force[0] += f[0];
-                force[1] += f[1];
+                const auto f = square_force(k, grid.cells.stress(c, lanes), half_side);
+                mass += lanes.load(&grid.cells.mass[c]);
+                fx += f[0];
+                fy += f[1];
             }
-            grid.nodes.mass[i] = 0.25 * mass;
-            grid.nodes.fx[i] = force[0];
-            grid.nodes.fy[i] = force[1];
+            lanes.store(&grid.nodes.mass[n], Pack(0.25) * mass);
+            lanes.store(&grid.nodes.fx[n], fx);
+            lanes.store(&grid.nodes.fy[n], fy);
         });
 }
 
 /// Eqs. (5a)-(5d): gradient of the increment over dt in each cell.
 inline void cell_gradients(LpfdmGrid& grid, double dt)
 {
-    const double scale = dt / (2 * grid.lattice.cell_size);
+    const Pack scale(dt / (2 * grid.lattice.cell_size));
     grid.for_each_cell(
-        [&](std::size_t c)
+        [&](std::size_t c, std::size_t n, const auto& lanes)
         {
-            double ux[4], uy[4];
-            grid.corner_velocities(c, ux, uy);
-            grid.cells.gradient[c] = square_gradient(ux, uy, scale);
+            const auto g = square_gradient(grid.at_corners(grid.nodes.vx, n, lanes), grid.at_corners(grid.nodes.vy, n, lanes), scale);
+            lanes.store(&grid.cells.xx[c], g.xx);
+            lanes.store(&grid.cells.yy[c], g.yy);
+            lanes.store(&grid.cells.xy[c], g.xy);
+            lanes.store(&grid.cells.yx[c], g.yx);
         });
 }
 
 /// Viscous force against the pattern (+1, -1, -1, +1), which no gradient sees and no linear field contains.
-/// The pattern decays at four times the rate. @param rate chi c_p / L [1/s] @param amplitude one force per cell of the lattice
-inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<Vec2>& amplitude)
+/// The pattern decays at four times the rate. @param rate chi c_p / L [1/s] @param x, y one force per cell of the lattice
+inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& x, std::vector<double>& y)
 {
+    const auto pattern = [](const std::array<Pack, 4>& v) { return v[0] - v[1] - v[2] + v[3]; };
     grid.for_each_cell(
-        [&](std::size_t c)
+        [&](std::size_t c, std::size_t n, const auto& lanes)
         {
-            double ux[4], uy[4];
-            grid.corner_velocities(c, ux, uy);
-            const double f = -0.25 * rate * grid.cells.mass[c];
-            amplitude[c] = {f * (ux[0] - ux[1] - ux[2] + ux[3]), f * (uy[0] - uy[1] - uy[2] + uy[3])};
+            const Pack f = Pack(-0.25 * rate) * lanes.load(&grid.cells.mass[c]);
+            lanes.store(&x[c], f * pattern(grid.at_corners(grid.nodes.vx, n, lanes)));
+            lanes.store(&y[c], f * pattern(grid.at_corners(grid.nodes.vy, n, lanes)));
         });
     grid.for_each_node(
-        [&](std::size_t i, std::size_t first_cell)
+        [&](std::size_t n, std::size_t first_cell, const auto& lanes)
         {
-            for (int k = 0; k < 4; ++k)
-                if (const std::size_t c = grid.around(first_cell, k); grid.cells.mass[c] > 0)
-                {
-                    const double sign = (k == 0 || k == 3) ? 1 : -1;
-                    grid.nodes.fx[i] += sign * amplitude[c][0];
-                    grid.nodes.fy[i] += sign * amplitude[c][1];
-                }
+            const auto around = [&](const std::vector<double>& v, int k) { return lanes.load(&v[grid.around(first_cell, k)]); };
+            const auto add = [&](std::vector<double>& f, const std::vector<double>& v)
+            { lanes.store(&f[n], lanes.load(&f[n]) + around(v, 0) - around(v, 1) - around(v, 2) + around(v, 3)); };
+            add(grid.nodes.fx, x);
+            add(grid.nodes.fy, y);
         });
 }
 
@@ -103,11 +145,11 @@ struct BinMotion
     std::array<Gradient<>, S * S> cell;
     std::array<double, (S + 1) * (S + 1)> ux, uy;
 
-    BinMotion(const LpfdmGrid& grid, const Bin& bin, double dt)
+    [[gnu::always_inline]] BinMotion(const LpfdmGrid& grid, const Bin& bin, double dt)
     {
         for (int j = 0; j < S; ++j)
             for (int i = 0; i < S; ++i)
-                cell[j * S + i] = grid.cells.gradient[grid.lattice.cell(bin.i + i, bin.j + j)];
+                cell[j * S + i] = grid.cells.gradient(grid.lattice.cell(bin.i + i, bin.j + j));
         for (int j = 0; j <= S; ++j)
             for (int i = 0; i <= S; ++i)
             {
@@ -116,20 +158,20 @@ struct BinMotion
                 uy[j * (S + 1) + i] = grid.nodes.vy[n] * dt;
             }
     }
-    Gradient<Pack> gradient(const Corner& c) const
+    [[gnu::always_inline]] Gradient<Pack> gradient(const Corner& c) const
     {
-        const auto wx = Support::weights(c.ax, c.wx), wy = Support::weights(c.ay, c.wy);
+        const Weights<Support> weights(c);
         Gradient<Pack> d{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
         for (int j = 0; j < S; ++j)
             for (int i = 0; i < S; ++i)
             {
-                const Pack w = wx[i] * wy[j];
+                const Pack w = weights.x[i] * weights.y[j];
                 const Gradient<>& g = cell[j * S + i];
                 d = d + Gradient<Pack>{w * Pack(g.xx), w * Pack(g.yy), w * Pack(g.xy), w * Pack(g.yx)};
             }
         return d;
     }
-    void displace(const Corner& c, Pack& x, Pack& y) const
+    [[gnu::always_inline]] void displace(const Corner& c, Pack& x, Pack& y) const
     {
         const auto wx = hat(c.ax + Pack(0.5) * c.wx), wy = hat(c.ay + Pack(0.5) * c.wy);
         for (int j = 0; j <= S; ++j)
@@ -145,7 +187,7 @@ struct BinMotion
         }
     }
     /// Bilinear weights of the nodes 0..S at xi in [0, S).
-    static std::array<Pack, S + 1> hat(Pack xi)
+    [[gnu::always_inline]] static std::array<Pack, S + 1> hat(Pack xi)
     {
         if constexpr (S == 1)
             return {Pack(1.0) - xi, xi};
@@ -157,40 +199,40 @@ struct BinMotion
     }
 };
 
-/// Strain and rotation (5e), (5f), stress, volume, and position by eq. (6), for the points of one body.
-/// Returns whether a point left its bin.
+/// Strain and rotation (5e), (5f), stress, volume, and position by eq. (6), for the points of one body; and, while they are at hand, the
+/// sums of its bins (`sums`, from the body's first on) for the next step. Returns whether a point left its bin: its sums are then no longer
+/// right.
 template <class Support, class Law>
-bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt)
+bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, double* sums)
 {
     Points& q = body.points;
     Bins& sorted = body.bins;
     const auto& bins = sorted.list();
     std::atomic<bool> moved{false};
-    parallel_for(bins.size(),
-                 [&](std::size_t b)
-                 {
-                     const BinFrame frame(grid.lattice, bins[b]);
-                     const BinMotion<Support> motion(grid, bins[b], dt);
-                     bool left = false;
-                     for_each_pack(bins[b].begin, bins[b].end,
-                                   [&](std::size_t p, const auto& lanes)
-                                   {
-                                       Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
-                                       const Corner c = frame.corner<Support>(q, p, lanes, x, y);
-                                       const Gradient<Pack> d = motion.gradient(c);
-                                       motion.displace(c, x, y);
-                                       law.update(q, p, lanes, d);
-                                       stretch<Support>(q, p, lanes, d);
-                                       lanes.store(&q.x[p], x);
-                                       lanes.store(&q.y[p], y);
-                                       left |= frame.left<Support>(q, p, lanes, x, y);
-                                   });
-                     if (left)
-                     {
-                         sorted.mark(b);
-                         moved.store(true, std::memory_order_relaxed);
-                     }
-                 });
+    parallel_for(
+        bins.size(), [&](std::size_t b) __attribute__((flatten)) {
+            const BinFrame frame(grid.lattice, bins[b]);
+            const BinMotion<Support> motion(grid, bins[b], dt);
+            bool left = false;
+            for_each_pack(
+                bins[b].begin, bins[b].end, [&](std::size_t p, const auto& lanes) __attribute__((always_inline)) {
+                    Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
+                    const Corner c = frame.corner<Support>(q, p, lanes, x, y);
+                    const Gradient<Pack> d = motion.gradient(c);
+                    motion.displace(c, x, y);
+                    law.update(q, p, lanes, d);
+                    stretch<Support>(q, p, lanes, d);
+                    lanes.store(&q.x[p], x);
+                    lanes.store(&q.y[p], y);
+                    left |= frame.left<Support>(q, p, lanes, frame.corner<Support>(q, p, lanes, x, y));
+                });
+            sum_bin<Support, CellSums<Support>>(grid.lattice, body, bins[b], sums + b * CellSums<Support>::numbers);
+            if (left)
+            {
+                sorted.mark(b);
+                moved.store(true, std::memory_order_relaxed);
+            }
+        });
     return moved;
 }
 }  // namespace testbed

@@ -8,18 +8,28 @@ namespace testbed
 {
 struct Cells
 {
-    std::vector<double> mass;          ///< M_j, eq. (7) [kg/m]; zero marks a cell without points
-    std::vector<SymTensor<>> stress;   ///< <sigma>_j, eq. (8) [Pa]
-    std::vector<Gradient<>> gradient;  ///< eq. (5), of the increment over a step [-]
+    std::vector<double> mass;            ///< M_j, eq. (7) [kg/m]; zero marks a cell without points
+    std::vector<double> sxx, syy, sxy;   ///< <sigma>_j, eq. (8) [Pa]
+    std::vector<double> xx, yy, xy, yx;  ///< gradient, eq. (5), of the increment over a step [-]
 
-    explicit Cells(std::size_t n) : mass(n), stress(n), gradient(n) {}
+    explicit Cells(std::size_t n) : mass(n), sxx(n), syy(n), sxy(n), xx(n), yy(n), xy(n), yx(n) {}
+    Gradient<> gradient(std::size_t c) const { return {xx[c], yy[c], xy[c], yx[c]}; }
+    template <class Lanes>
+    Gradient<Pack> gradient(std::size_t c, const Lanes& lanes) const
+    {
+        return {lanes.load(&xx[c]), lanes.load(&yy[c]), lanes.load(&xy[c]), lanes.load(&yx[c])};
+    }
+    template <class Lanes>
+    SymTensor<Pack> stress(std::size_t c, const Lanes& lanes) const
+    {
+        return {lanes.load(&sxx[c]), lanes.load(&syy[c]), lanes.load(&sxy[c])};
+    }
     void clear(std::size_t c)
     {
-        mass[c] = 0;
-        stress[c] = {};
-        gradient[c] = {};
+        for (auto* field : {&mass, &sxx, &syy, &sxy, &xx, &yy, &xy, &yx})
+            (*field)[c] = 0;
     }
-    std::size_t bytes() const { return mass.size() * (sizeof(double) + sizeof(SymTensor<>) + sizeof(Gradient<>)); }
+    std::size_t bytes() const { return 8 * mass.size() * sizeof(double); }
 };
 
 struct LpfdmGrid
@@ -27,8 +37,7 @@ struct LpfdmGrid
     Lattice lattice;
     Cells cells;
     Nodes nodes;
-    Gather gather;                          ///< from points to cells
-    std::vector<std::uint32_t> first_cell;  ///< for each active node the cell of which it is corner [1]
+    Gather gather;  ///< from points to cells
 
     explicit LpfdmGrid(const Lattice& l) : lattice(l), cells(l.cells()), nodes(l.nodes()), gather(l.cells()) {}
 
@@ -43,6 +52,7 @@ struct LpfdmGrid
         return first - static_cast<std::size_t>(k & 1) - static_cast<std::size_t>(k >> 1) * lattice.cell_stride();
     }
     std::size_t first_node(std::size_t cell) const { return lattice.node(lattice.cell_i(cell), lattice.cell_j(cell)); }
+    std::size_t first_cell(std::size_t node) const { return lattice.cell(lattice.node_i(node), lattice.node_j(node)); }
 
     /// Cells and nodes in use, from bins that were sorted anew. Returns the nodes that are no longer in use.
     template <int S>
@@ -59,35 +69,48 @@ struct LpfdmGrid
         used.erase(std::unique(used.begin(), used.end()), used.end());
         used.shrink_to_fit();
         std::vector<std::uint32_t> left;
-        std::set_difference(nodes.active.begin(), nodes.active.end(), used.begin(), used.end(), std::back_inserter(left));
-        nodes.active = std::move(used);
-        first_cell.resize(nodes.active.size());
-        for (std::size_t a = 0; a < nodes.active.size(); ++a)
-            first_cell[a] = static_cast<std::uint32_t>(lattice.cell(lattice.node_i(nodes.active[a]), lattice.node_j(nodes.active[a])));
+        std::set_difference(nodes.active().begin(), nodes.active().end(), used.begin(), used.end(), std::back_inserter(left));
+        nodes.set_active(std::move(used));
+        node_runs_ = runs_of(nodes.active(), lattice.node_stride());
+        cell_runs_ = runs_of(gather.active(), lattice.cell_stride());
         return left;
     }
 
-    /// f(cell)
-    template <class F>
-    void for_each_cell(F&& f) const
+    /// kernel(c, n, lanes) for the cells [c, c + lanes) in use, with their first nodes [n, n + lanes).
+    template <class Kernel>
+    void for_each_cell(Kernel&& kernel) const
     {
-        parallel_for(gather.active().size(), [&](std::size_t a) { f(gather.active()[a]); });
+        for_each_run(cell_runs_,
+                     [&](const Run& run)
+                     {
+                         const std::size_t n = first_node(run.begin);
+                         for_each_pack(0, run.count, [&](std::size_t k, const auto& lanes) { kernel(run.begin + k, n + k, lanes); });
+                     });
     }
-    /// f(node, first cell)
-    template <class F>
-    void for_each_node(F&& f) const
+    /// kernel(n, c, lanes) for the nodes [n, n + lanes) in use, with their first cells [c, c + lanes).
+    template <class Kernel>
+    void for_each_node(Kernel&& kernel) const
     {
-        parallel_for(nodes.active.size(), [&](std::size_t a) { f(nodes.active[a], first_cell[a]); });
+        for_each_run(node_runs_,
+                     [&](const Run& run)
+                     {
+                         const std::size_t c = first_cell(run.begin);
+                         for_each_pack(0, run.count, [&](std::size_t k, const auto& lanes) { kernel(run.begin + k, c + k, lanes); });
+                     });
     }
-    void corner_velocities(std::size_t cell, double (&ux)[4], double (&uy)[4]) const
+    /// Nodal values at the corners of the cells whose first nodes are [n, n + lanes).
+    template <class Lanes>
+    std::array<Pack, 4> at_corners(const std::vector<double>& values, std::size_t n, const Lanes& lanes) const
     {
-        const std::size_t first = first_node(cell);
-        for (int k = 0; k < 4; ++k)
-        {
-            ux[k] = nodes.vx[corner(first, k)];
-            uy[k] = nodes.vy[corner(first, k)];
-        }
+        return {lanes.load(&values[n]), lanes.load(&values[corner(n, 1)]), lanes.load(&values[corner(n, 2)]),
+                lanes.load(&values[corner(n, 3)])};
     }
-    std::size_t bytes() const { return cells.bytes() + nodes.bytes() + gather.bytes() + first_cell.capacity() * sizeof(std::uint32_t); }
+    std::size_t bytes() const
+    {
+        return cells.bytes() + nodes.bytes() + gather.bytes() + (node_runs_.capacity() + cell_runs_.capacity()) * sizeof(Run);
+    }
+
+private:
+    std::vector<Run> node_runs_, cell_runs_;
 };
 }  // namespace testbed

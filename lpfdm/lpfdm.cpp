@@ -33,12 +33,14 @@ public:
         if (has_nonlocal_softening(scene))
             nonlocal_.emplace(scene, grid_.lattice.cell_size, grid_.lattice.cell_stride(), grid_.lattice.cells());
         if (options_.hourglass > 0)
-            hourglass_.resize(grid_.lattice.cells());
+        {
+            hourglass_x_.resize(grid_.lattice.cells());
+            hourglass_y_.resize(grid_.lattice.cells());
+        }
         for (const Body& body : bodies_)
             wave_speed_ =
                 std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
         rebuild();
-        cell_averages<Support>(grid_, bodies_, workspace_);
         set_initial_velocity(scene);
     }
 
@@ -57,7 +59,7 @@ public:
                        nonlocal_->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
                                                           [&](int i, int j) { return grid_.lattice.cell(i, j); });
                    });
-        timer_("cell averages (7)(8)", [&] { cell_averages<Support>(grid_, bodies_, workspace_); });
+        timer_("cell averages (7)(8)", [&] { cell_averages(grid_, sums_.all()); });
         timer_("nodal forces (9)(10)", [&] { nodal_forces(grid_); });
         timer_("convection (13)",
                [&]
@@ -66,8 +68,9 @@ public:
                    convect_velocity(dt);
                    node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
                });
-        if (!hourglass_.empty())
-            timer_("hourglass", [&] { resist_hourglass(grid_, options_.hourglass * wave_speed_ / grid_.lattice.cell_size, hourglass_); });
+        if (!hourglass_x_.empty())
+            timer_("hourglass", [&]
+                   { resist_hourglass(grid_, options_.hourglass * wave_speed_ / grid_.lattice.cell_size, hourglass_x_, hourglass_y_); });
         internal_ = force_norm(nodes_);
         timer_("node operations (11)(15)",
                [&]
@@ -95,8 +98,13 @@ public:
         timer_("points (6), material",
                [&]
                {
+                   std::size_t first_bin = 0;
                    for (Body& body : bodies_)
-                       moved_ |= std::visit([&](const auto& law) { return move_points<Support>(grid_, body, law, dt); }, body.material);
+                   {
+                       moved_ |= std::visit(
+                           [&](const auto& law) { return move_points<Support>(grid_, body, law, dt, sums_.of(first_bin)); }, body.material);
+                       first_bin += body.bins.list().size();
+                   }
                });
         node_ops_.end_step(dt);
     }
@@ -130,9 +138,9 @@ public:
     std::size_t active_cells() const override { return grid_.gather.active().size(); }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + grid_.bytes() + was_active_.capacity() + workspace_.capacity() * sizeof(double) +
-               (hourglass_.capacity() + cell_force_.capacity()) * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) +
-               (nonlocal_ ? nonlocal_->bytes() : 0);
+        return bytes_of(bodies_) + grid_.bytes() + was_active_.capacity() * sizeof(double) + sums_.bytes() +
+               (workspace_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity()) * sizeof(double) +
+               cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
@@ -153,7 +161,7 @@ private:
         }
         if (other_bins)
             left_ = grid_.rebuild<S>(bins);
-        make_room(workspace_, grid_.gather.blocks() * 4);
+        sums_.update(grid_.lattice, bodies_);
         moved_ = false;
     }
 
@@ -161,8 +169,10 @@ private:
     /// active before (or start from zero, as printed); nodes that it left are cleared.
     void extend_to_frontier()
     {
+        if (left_.empty() && !frontier_moved())
+            return;
         std::vector<std::pair<std::uint32_t, Vec2>> reached;
-        for (const auto n : nodes_.active)
+        for (const auto n : nodes_.active())
             if (nodes_.mass[n] > 0 && !was_active_[n])
                 reached.emplace_back(n, started_ && options_.frontier == "extrapolate" ? mean_of_neighbours(n) : Vec2{0, 0});
         for (const auto& [n, v] : reached)
@@ -179,9 +189,31 @@ private:
             if (!was_active_[n])
                 nodes_.vx[n] = nodes_.vy[n] = 0;
         };
-        std::for_each(nodes_.active.begin(), nodes_.active.end(), update);
+        std::for_each(nodes_.active().begin(), nodes_.active().end(), update);
         std::for_each(left_.begin(), left_.end(), update);
         left_.clear();
+    }
+
+    /// Whether a node won or lost its mass; those without come to rest.
+    bool frontier_moved()
+    {
+        std::atomic<bool> moved{false};
+        nodes_.for_each(
+            [&](std::size_t n, const auto& lanes)
+            {
+                const Pack mass = lanes.load(&nodes_.mass[n]), was = lanes.load(&was_active_[n]);
+                const auto has = mass > Pack(0.0);
+                if (lanes.any(has != (was > Pack(0.0))))
+                    moved.store(true, std::memory_order_relaxed);
+                if (!lanes.any(!has))
+                    return;
+                Pack vx = lanes.load(&nodes_.vx[n]), vy = lanes.load(&nodes_.vy[n]);
+                stdx::where(!has, vx) = Pack(0.0);
+                stdx::where(!has, vy) = Pack(0.0);
+                lanes.store(&nodes_.vx[n], vx);
+                lanes.store(&nodes_.vy[n], vy);
+            });
+        return moved;
     }
 
     Vec2 mean_of_neighbours(std::uint32_t node) const
@@ -220,16 +252,13 @@ private:
     {
         body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather, t,
                                              [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
-        grid_.for_each_node(
-            [&](std::size_t i, std::size_t first_cell)
-            {
-                for (int k = 0; k < 4; ++k)
-                    if (const std::size_t c = grid_.around(first_cell, k); grid_.cells.mass[c] > 0)
-                    {
-                        nodes_.fx[i] += 0.25 * cell_force_[c][0];
-                        nodes_.fy[i] += 0.25 * cell_force_[c][1];
-                    }
-            });
+        for (const auto n : nodes_.active())
+            for (int k = 0; k < 4; ++k)
+                if (const std::size_t c = grid_.around(grid_.first_cell(n), k); grid_.cells.mass[c] > 0)
+                {
+                    nodes_.fx[n] += 0.25 * cell_force_[c][0];
+                    nodes_.fy[n] += 0.25 * cell_force_[c][1];
+                }
     }
 
     /// Nodes start with the bodies' velocity at their own position, weighted by the mass that each body gives them.
@@ -248,7 +277,7 @@ private:
                     {
                         const std::size_t n = grid_.corner(grid_.lattice.node(bin.i + k % S, bin.j + k / S), corner);
                         const Vec2 x = grid_.lattice.node_position(n);
-                        const double m = 0.25 * workspace_[block * 4];
+                        const double m = 0.25 * sums_.all()[block * 4];
                         mass[n] += m;
                         if (!velocity)
                             continue;
@@ -257,7 +286,7 @@ private:
                         nodes_.vy[n] += m * v[1];
                     }
         }
-        for (const auto n : nodes_.active)
+        for (const auto n : nodes_.active())
             if (mass[n] > 0)
             {
                 nodes_.vx[n] /= mass[n];
@@ -269,11 +298,13 @@ private:
     Nodes& nodes_ = grid_.nodes;
     std::vector<Body> bodies_;
     NodeOps node_ops_;
-    std::vector<char> was_active_;     ///< nodes that had mass in the step before
+    std::vector<double> was_active_;   ///< 1 for nodes that had mass in the step before
     std::vector<std::uint32_t> left_;  ///< nodes that went out of use
     LpfdmSpec options_;
-    std::vector<double> workspace_;             ///< sums of bins, and the way of a field to its new order
-    std::vector<Vec2> hourglass_, cell_force_;  ///< empty unless the scene has them
+    LpfdmSums<Support> sums_;                        ///< up to date from the end of a step on, but for bins that points left
+    std::vector<double> workspace_;                  ///< the way of a field to its new order
+    std::vector<double> hourglass_x_, hourglass_y_;  ///< empty unless the scene has them
+    std::vector<Vec2> cell_force_;                   ///< so, too
     std::optional<BodyForce> body_force_;
     std::optional<Tractions> tractions_;
     std::optional<NonlocalStrain> nonlocal_;

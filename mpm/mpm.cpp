@@ -64,7 +64,7 @@ public:
             timer_("points to nodes",
                    [&]
                    {
-                       points_to_nodes<Scatter::momentum_and_force>();
+                       to_nodes<Scatter::momentum_and_force>(sums_.all());
                        restrain_mapped_velocity();
                    });
         fold_forces();
@@ -92,20 +92,21 @@ public:
         // the given initial velocity is that of t = 0: the first kick is half a step
         timer_("acceleration", [&] { accelerate_and_keep_increment(started_ ? dt : 0.5 * dt); });
         started_ = true;
-        timer_("nodes to points", [&] { options_.flip < 1 ? update_velocity<true>() : update_velocity<false>(); });
-        if (options_.scheme == "musl")
+        const bool remap = options_.scheme == "musl";
+        timer_("nodes to points", [&] { update_velocity(remap); });
+        if (remap)
         {
             timer_("remap velocity",
                    [&]
                    {
                        carrier_x_.resize(nodes_.vx.size());
                        carrier_y_.resize(nodes_.vy.size());
-                       for (const auto n : nodes_.active)
+                       for (const auto n : nodes_.active())
                        {
                            carrier_x_[n] = nodes_.vx[n];
                            carrier_y_[n] = nodes_.vy[n];
                        }
-                       points_to_nodes<Scatter::momentum>();
+                       to_nodes<Scatter::momentum>(workspace_);
                        node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
                        extend(nodes_.vx, nodes_.vy);
                    });
@@ -131,7 +132,7 @@ public:
     }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() +
+        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() + sums_.bytes() +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
                    sizeof(double) +
                (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
@@ -156,28 +157,36 @@ private:
         if (other_bins)
         {
             gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
-            for (const auto n : nodes_.active)  // what is left must not be taken for soil
+            for (const auto n : nodes_.active())  // what is left must not be taken for soil
                 nodes_.mass[n] = nodes_.vx[n] = nodes_.vy[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
-            nodes_.active = gather_.active();
+            nodes_.set_active(gather_.active());
             if constexpr (reaches_beyond)
-                edges_.rebuild(lattice_, nodes_.active);
+                edges_.rebuild(lattice_, nodes_.active());
         }
+        if (options_.scheme != "usf")
+            sums_.update(lattice_, bodies_);
         moved_ = false;
     }
 
-    /// Mass, velocity and internal force of the nodes, or a part of them.
+    /// Mass, velocity and internal force of the nodes, or a part of them, from the points.
     template <Scatter what>
     void points_to_nodes()
     {
-        constexpr std::size_t Q = sums_of<what>;
-        make_room(workspace_, gather_.blocks() * Q);
+        make_room(workspace_, gather_.blocks() * sums_of<what>);
         std::size_t first_bin = 0;
         for (const Body& body : bodies_)
         {
             scatter<Shape, Strain, what>(lattice_, body, first_bin, workspace_);
             first_bin += body.bins.list().size();
         }
-        gather_.sum<Q>(workspace_,
+        to_nodes<what>(workspace_);
+    }
+    /// The same from the sums of all bins.
+    template <Scatter what>
+    void to_nodes(const std::vector<double>& sums)
+    {
+        constexpr std::size_t Q = sums_of<what>;
+        gather_.sum<Q>(sums,
                        [&](std::size_t i, const std::array<double, Q>& s)
                        {
                            if constexpr (what != Scatter::force)
@@ -199,7 +208,7 @@ private:
             edges_.fold_mass(nodes_.mass);
             edges_.fold(nodes_.vx);
             edges_.fold(nodes_.vy);
-            parallel_for(nodes_.active.size(), [&](std::size_t a) { to_velocity(nodes_.active[a]); });
+            parallel_for(nodes_.active().size(), [&](std::size_t a) { to_velocity(nodes_.active()[a]); });
         }
     }
     void to_velocity(std::size_t i)
@@ -233,7 +242,7 @@ private:
             return extend(nodes_.vx, nodes_.vy);
         mapped_x_.resize(nodes_.vx.size());
         mapped_y_.resize(nodes_.vy.size());
-        for (const auto n : nodes_.active)
+        for (const auto n : nodes_.active())
         {
             mapped_x_[n] = nodes_.vx[n];
             mapped_y_[n] = nodes_.vy[n];
@@ -248,10 +257,10 @@ private:
         accelerate(nodes_, dt);
         node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
         const bool restrained = node_ops_.restrains();
-        parallel_for(nodes_.active.size(),
+        parallel_for(nodes_.active().size(),
                      [&](std::size_t a)
                      {
-                         const std::size_t i = nodes_.active[a];
+                         const std::size_t i = nodes_.active()[a];
                          const double step = inverse_mass(nodes_, i) * dt;
                          nodes_.fx[i] = restrained ? nodes_.vx[i] - mapped_x_[i] : nodes_.fx[i] * step;
                          nodes_.fy[i] = restrained ? nodes_.vy[i] - mapped_y_[i] : nodes_.fy[i] * step;
@@ -260,53 +269,66 @@ private:
         extend(nodes_.fx, nodes_.fy);
     }
 
-    /// kernel(body, law, bin, frame) for every bin of every body.
+    /// kernel(body, law, bin, number of the bin among all, frame) for every bin of every body.
     template <class Kernel>
     void for_each_bin(Kernel&& kernel)
     {
+        std::size_t first_bin = 0;
         for (Body& body : bodies_)
+        {
+            const auto& bins = body.bins.list();
             std::visit(
-                [&](const auto& law)
-                {
-                    const auto& bins = body.bins.list();
-                    parallel_for(bins.size(), [&](std::size_t b) { kernel(body, law, bins[b], BinFrame(lattice_, bins[b])); });
+                [&](const auto& law) {
+                    parallel_for(bins.size(),
+                                 [&](std::size_t b) { kernel(body, law, bins[b], first_bin + b, BinFrame(lattice_, bins[b])); });
                 },
                 body.material);
+            first_bin += bins.size();
+        }
     }
 
-    /// v_p = flip (v_p + sum N dv) + (1 - flip) sum N v.
-    template <bool with_pic>
+    void update_velocity(bool remap)
+    {
+        if (remap)
+            make_room(workspace_, gather_.blocks() * sums_of<Scatter::momentum>);
+        if (options_.flip < 1)
+            remap ? update_velocity<true, true>() : update_velocity<true, false>();
+        else
+            remap ? update_velocity<false, true>() : update_velocity<false, false>();
+    }
+    /// v_p = flip (v_p + sum N dv) + (1 - flip) sum N v; and the sums of the new momentum, if nodes ask for them.
+    template <bool with_pic, bool with_remap>
     void update_velocity()
     {
+        using Momentum = NodeSums<Shape, Strain, Scatter::momentum>;
         const Pack flip(options_.flip), pic(1 - options_.flip);
-        for_each_bin(
-            [&](Body& body, const auto&, const Bin& bin, const BinFrame& frame)
-            {
-                Points& q = body.points;
-                const NodalVelocity<S> increment(lattice_, bin, nodes_.fx, nodes_.fy), total(lattice_, bin, nodes_.vx, nodes_.vy);
-                for_each_pack(bin.begin, bin.end,
-                              [&](std::size_t p, const auto& lanes)
-                              {
-                                  const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                                  const auto dv = increment.at(at);
-                                  Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
-                                  if constexpr (with_pic)
-                                  {
-                                      const auto v = total.at(at);
-                                      vx = flip * vx + pic * v[0];
-                                      vy = flip * vy + pic * v[1];
-                                  }
-                                  lanes.store(&q.vx[p], vx);
-                                  lanes.store(&q.vy[p], vy);
-                              });
-            });
+        for_each_bin([&](Body & body, const auto&, const Bin& bin, std::size_t number, const BinFrame& frame) __attribute__((flatten)) {
+            Points& q = body.points;
+            const NodalVelocity<S> increment(lattice_, bin, nodes_.fx, nodes_.fy), total(lattice_, bin, nodes_.vx, nodes_.vy);
+            for_each_pack(
+                bin.begin, bin.end, [&](std::size_t p, const auto& lanes) __attribute__((always_inline)) {
+                    const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
+                    const auto dv = increment.at(at);
+                    Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
+                    if constexpr (with_pic)
+                    {
+                        const auto v = total.at(at);
+                        vx = flip * vx + pic * v[0];
+                        vy = flip * vy + pic * v[1];
+                    }
+                    lanes.store(&q.vx[p], vx);
+                    lanes.store(&q.vy[p], vy);
+                });
+            if constexpr (with_remap)
+                sum_bin<Shape, Momentum>(lattice_, body, bin, &workspace_[number * Momentum::numbers]);
+        });
     }
 
     /// Stress alone, with the nodal velocity (USF).
     void update_stress(double dt)
     {
         for_each_bin(
-            [&](Body& body, const auto& law, const Bin& bin, const BinFrame& frame)
+            [&](Body& body, const auto& law, const Bin& bin, std::size_t, const BinFrame& frame)
             {
                 Points& q = body.points;
                 const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
@@ -320,39 +342,47 @@ private:
             });
     }
 
-    /// Position with the carrier velocity; volume or box, and stress if it is not updated first, with the nodal velocity.
+    /// Position with the carrier velocity; volume or box with the nodal velocity. If the stress is not updated first: stress, too, and the
+    /// sums of the bins for the next step.
     template <bool with_stress>
     void move_points(const std::vector<double>& carrier_x, const std::vector<double>& carrier_y, double dt)
     {
         std::atomic<bool> moved{false};
-        for_each_bin(
-            [&](Body& body, const auto& law, const Bin& bin, const BinFrame& frame)
+        for_each_bin([&](Body & body, const auto& law, const Bin& bin, std::size_t number, const BinFrame& frame) __attribute__((flatten)) {
+            Points& q = body.points;
+            const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
+            const NodalVelocity<S> carrier(lattice_, bin, carrier_x, carrier_y), v(lattice_, bin, nodes_.vx, nodes_.vy);
+            bool left = false;
+            for_each_pack(
+                bin.begin, bin.end, [&](std::size_t p, const auto& lanes) __attribute__((always_inline)) {
+                    const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
+                    const Gradient<Pack> d = v.template gradient<Strain>(at, strain, dt);
+                    if constexpr (with_stress)
+                        law.update(q, p, lanes, d);
+                    stretch<Shape>(q, p, lanes, d);
+                    const auto step = carrier.at(at);
+                    const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
+                    lanes.store(&q.x[p], x);
+                    lanes.store(&q.y[p], y);
+                    left |= frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x, y));
+                    if constexpr (reaches_beyond)
+                        left |= lanes.any(outside(x, y));
+                });
+            if constexpr (with_stress)
+                sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number));
+            if (left)
             {
-                Points& q = body.points;
-                const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
-                const NodalVelocity<S> carrier(lattice_, bin, carrier_x, carrier_y), v(lattice_, bin, nodes_.vx, nodes_.vy);
-                bool left = false;
-                for_each_pack(bin.begin, bin.end,
-                              [&](std::size_t p, const auto& lanes)
-                              {
-                                  const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                                  const Gradient<Pack> d = v.template gradient<Strain>(at, strain, dt);
-                                  if constexpr (with_stress)
-                                      law.update(q, p, lanes, d);
-                                  stretch<Shape>(q, p, lanes, d);
-                                  const auto step = carrier.at(at);
-                                  const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
-                                  lanes.store(&q.x[p], x);
-                                  lanes.store(&q.y[p], y);
-                                  left |= frame.left<Shape>(q, p, lanes, x, y);
-                              });
-                if (left)
-                {
-                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
-                    moved.store(true, std::memory_order_relaxed);
-                }
-            });
+                body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
+                moved.store(true, std::memory_order_relaxed);
+            }
+        });
         moved_ = moved;
+    }
+    /// Whether points left the lattice: with shapes that begin half a cell from the point they do so in the middle of a bin.
+    Pack::mask_type outside(Pack x, Pack y) const
+    {
+        const Vec2 &low = lattice_.origin, high{low[0] + lattice_.nx * lattice_.cell_size, low[1] + lattice_.ny * lattice_.cell_size};
+        return !(x >= Pack(low[0]) && x < Pack(high[0]) && y >= Pack(low[1]) && y < Pack(high[1]));
     }
 
     Lattice lattice_;
@@ -361,8 +391,10 @@ private:
     Nodes nodes_;
     Gather gather_;
     LatticeEdges edges_;  ///< empty where shapes end at the edge
+    using Sums = NodeSums<Shape, Strain, Scatter::momentum_and_force>;
+    BinSums<Shape, Sums> sums_;  ///< up to date from the end of a step on, but for bins that points left; empty if stress comes first
     MpmSpec options_;
-    std::vector<double> workspace_;  ///< sums of bins, and the way of a field to its new order
+    std::vector<double> workspace_;  ///< sums of the remapped momentum, and the way of a field to its new order
     std::vector<double> carrier_x_, carrier_y_;
     std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls
     std::optional<BodyForce> body_force_;

@@ -2,6 +2,7 @@
 /// Particle-to-node and node-to-particle kernels of MPM. A bin's nodes are the same for all its points, so their values are
 /// loaded once and their sums are kept in registers.
 
+#include "core/bin_sums.hpp"
 #include "core/gather.hpp"
 #include "core/kinematics.hpp"
 #include "core/support.hpp"
@@ -16,7 +17,7 @@ struct ShapeAt
     static constexpr int S = Shape::S;
     std::array<Pack, S> wx, wy, gx, gy;
 
-    ShapeAt(const Corner& c, double scale)
+    [[gnu::always_inline]] ShapeAt(const Corner& c, double scale)
         : wx(Shape::weights(c.ax, c.wx)),
           wy(Shape::weights(c.ay, c.wy)),
           gx(Shape::slopes(c.ax, c.wx)),
@@ -44,6 +45,44 @@ struct PointStrain
     };
 };
 
+struct NoSum
+{
+};
+
+/// The centroid of a cell's points by volume.
+class Centroid
+{
+public:
+    struct Slopes
+    {
+        std::array<double, 4> x, y;  ///< 1/m
+    };
+    [[gnu::always_inline]] void add(Pack v, Pack ax, Pack ay)
+    {
+        volume_ += v;
+        ax_ += v * ax;
+        ay_ += v * ay;
+    }
+    /// Slopes of the bilinear shape functions there.
+    template <class Shape>
+    Slopes slopes(double scale) const
+    {
+        static_assert(std::is_same_v<Shape, LinearShape>);
+        const double all = sum(volume_);
+        const ShapeAt<Shape> at({Pack(sum(ax_) / all), Pack(sum(ay_) / all), Pack(0.0), Pack(0.0)}, scale);
+        Slopes s;
+        for (int k = 0; k < 4; ++k)
+        {
+            s.x[static_cast<std::size_t>(k)] = at.slope_x(k % 2, k / 2)[0];
+            s.y[static_cast<std::size_t>(k)] = at.slope_y(k % 2, k / 2)[0];
+        }
+        return s;
+    }
+
+private:
+    Pack volume_{0.0}, ax_{0.0}, ay_{0.0};
+};
+
 /// Volumetric strain averaged over the cell (B-bar): the slopes that make the in-plane dilatation are those at the centroid of
 /// the cell's points, which is their volume-weighted mean since they are linear. The deviatoric part stays pointwise.
 struct BBarStrain
@@ -56,24 +95,19 @@ struct BBarStrain
 
         InBin(const Lattice& lattice, const Points& q, const Bin& bin)
         {
-            static_assert(std::is_same_v<Shape, LinearShape>);
             const BinFrame frame(lattice, bin);
-            Pack total(0.0), ax(0.0), ay(0.0);
+            Centroid centroid;
             for_each_pack(bin.begin, bin.end,
                           [&](std::size_t p, const auto& lanes)
                           {
                               const Corner c = frame.corner<Shape>(q, p, lanes);
-                              const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
-                              total += v;
-                              ax += v * lanes.keep(c.ax);
-                              ay += v * lanes.keep(c.ay);
+                              centroid.add(lanes.keep(volume<Shape>(q, p, lanes)), lanes.keep(c.ax), lanes.keep(c.ay));
                           });
-            const double all = sum(total);
-            const ShapeAt<Shape> at({Pack(sum(ax) / all), Pack(sum(ay) / all), Pack(0.0), Pack(0.0)}, frame.scale);
-            for (int k = 0; k < 4; ++k)
+            const auto slopes = centroid.slopes<Shape>(frame.scale);
+            for (std::size_t k = 0; k < 4; ++k)
             {
-                mean_x[k] = at.slope_x(k % 2, k / 2);
-                mean_y[k] = at.slope_y(k % 2, k / 2);
+                mean_x[k] = Pack(slopes.x[k]);
+                mean_y[k] = Pack(slopes.y[k]);
             }
         }
     };
@@ -91,69 +125,95 @@ inline constexpr std::size_t sums_of = what == Scatter::momentum_and_force ? 5
                                        : what == Scatter::momentum         ? 3
                                                                            : 2;
 
-/// m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V (sigma + p I) . grad N_i with the confining pressure p, to the blocks
-/// of each bin.
-/// With B-bar the mean in-plane stress works on the cell's dilatation: dual to NodalVelocity::gradient().
+/// What the points of one bin give to its S x S nodes: m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V (sigma + p I) . grad N_i
+/// with the confining pressure p. With B-bar the mean in-plane stress works on the cell's dilatation: dual to NodalVelocity::gradient().
+template <class Shape, class Strain, Scatter what>
+class NodeSums
+{
+public:
+    static constexpr int S = Shape::S;
+    static constexpr std::size_t Q = sums_of<what>, numbers = static_cast<std::size_t>(S * S) * Q;
+
+    [[gnu::always_inline]] NodeSums(const Lattice& lattice, const Bin&) : scale_(1 / lattice.cell_size) { set_zero(total_); }
+
+    /// Points [p, p + lanes) of the body, with their support at c.
+    template <class Lanes>
+    [[gnu::always_inline]] void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner& c)
+    {
+        const ShapeAt<Shape> at(c, scale_);
+        const Points& q = body.points;
+        [[maybe_unused]] Pack m, px, py, txx, tyy, txy;
+        if constexpr (what != Scatter::force)
+        {
+            m = lanes.keep(Pack(q.mass));
+            px = m * lanes.load(&q.vx[p]);
+            py = m * lanes.load(&q.vy[p]);
+        }
+        if constexpr (what != Scatter::momentum)
+        {
+            const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
+            txx = v * (lanes.load(&q.sxx[p]) + Pack(body.confinement));
+            tyy = v * (lanes.load(&q.syy[p]) + Pack(body.confinement));
+            txy = v * lanes.load(&q.sxy[p]);
+            if constexpr (Strain::averaged)
+            {
+                const Pack mean = Pack(0.5) * (txx + tyy);
+                txx -= mean;
+                tyy -= mean;
+                mean_ += mean;
+                strain_.add(v, lanes.keep(c.ax), lanes.keep(c.ay));
+            }
+        }
+        for (int j = 0; j < S; ++j)
+            for (int i = 0; i < S; ++i)
+            {
+                Pack* to = &total_[static_cast<std::size_t>(j * S + i) * Q];
+                if constexpr (what != Scatter::force)
+                {
+                    const Pack N = at.value(i, j);
+                    to[0] += m * N;
+                    to[1] += px * N;
+                    to[2] += py * N;
+                }
+                if constexpr (what != Scatter::momentum)
+                {
+                    const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
+                    to[Q - 2] -= txx * nx + txy * ny;
+                    to[Q - 1] -= txy * nx + tyy * ny;
+                }
+            }
+    }
+    [[gnu::always_inline]] void write(const Body&, const Bin&, double* to) const
+    {
+        for (std::size_t k = 0; k < numbers; ++k)
+            to[k] = sum(total_[k]);
+        if constexpr (Strain::averaged && what != Scatter::momentum)
+        {
+            const auto slopes = strain_.template slopes<Shape>(scale_);
+            const double mean = sum(mean_);
+            for (std::size_t k = 0; k < static_cast<std::size_t>(S * S); ++k)
+            {
+                to[k * Q + Q - 2] -= mean * slopes.x[k];
+                to[k * Q + Q - 1] -= mean * slopes.y[k];
+            }
+        }
+    }
+
+private:
+    double scale_;
+    std::array<Pack, numbers> total_;
+    [[no_unique_address]] std::conditional_t<Strain::averaged, Pack, NoSum> mean_{};
+    [[no_unique_address]] std::conditional_t<Strain::averaged, Centroid, NoSum> strain_{};
+};
+
+/// The sums of all bins of a body, anew.
 template <class Shape, class Strain, Scatter what>
 void scatter(const Lattice& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial)
 {
-    constexpr int S = Shape::S;
-    constexpr std::size_t Q = sums_of<what>;
+    using Sums = NodeSums<Shape, Strain, what>;
     const auto& bins = body.bins.list();
-    const Points& q = body.points;
     parallel_for(bins.size(),
-                 [&](std::size_t b)
-                 {
-                     const BinFrame frame(lattice, bins[b]);
-                     const typename Strain::template InBin<Shape> strain(lattice, q, bins[b]);
-                     std::array<Pack, S * S * Q> total{};
-                     for_each_pack(bins[b].begin, bins[b].end,
-                                   [&](std::size_t p, const auto& lanes)
-                                   {
-                                       const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                                       [[maybe_unused]] Pack m, px, py, txx, tyy, txy, mean;
-                                       if constexpr (what != Scatter::force)
-                                       {
-                                           m = lanes.keep(Pack(q.mass));
-                                           px = m * lanes.load(&q.vx[p]);
-                                           py = m * lanes.load(&q.vy[p]);
-                                       }
-                                       if constexpr (what != Scatter::momentum)
-                                       {
-                                           const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
-                                           txx = v * (lanes.load(&q.sxx[p]) + Pack(body.confinement));
-                                           tyy = v * (lanes.load(&q.syy[p]) + Pack(body.confinement));
-                                           txy = v * lanes.load(&q.sxy[p]);
-                                           mean = Pack(0.5) * (txx + tyy);
-                                       }
-                                       for (int j = 0; j < S; ++j)
-                                           for (int i = 0; i < S; ++i)
-                                           {
-                                               Pack* to = &total[static_cast<std::size_t>(j * S + i) * Q];
-                                               if constexpr (what != Scatter::force)
-                                               {
-                                                   const Pack N = at.value(i, j);
-                                                   to[0] += m * N;
-                                                   to[1] += px * N;
-                                                   to[2] += py * N;
-                                               }
-                                               if constexpr (what != Scatter::momentum)
-                                               {
-                                                   const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
-                                                   to[Q - 2] -= txx * nx + txy * ny;
-                                                   to[Q - 1] -= txy * nx + tyy * ny;
-                                                   if constexpr (Strain::averaged)
-                                                   {
-                                                       to[Q - 2] -= mean * (strain.mean_x[j * S + i] - nx);
-                                                       to[Q - 1] -= mean * (strain.mean_y[j * S + i] - ny);
-                                                   }
-                                               }
-                                           }
-                                   });
-                     double* to = &partial[(first_bin + b) * S * S * Q];
-                     for (std::size_t k = 0; k < total.size(); ++k)
-                         to[k] = sum(total[k]);
-                 });
+                 [&](std::size_t b) { sum_bin<Shape, Sums>(lattice, body, bins[b], &partial[(first_bin + b) * Sums::numbers]); });
 }
 
 /// Nodal values of one bin.
@@ -162,7 +222,8 @@ struct NodalVelocity
 {
     std::array<double, static_cast<std::size_t>(S*S)> x, y;
 
-    NodalVelocity(const Lattice& lattice, const Bin& bin, const std::vector<double>& vx, const std::vector<double>& vy)
+    [[gnu::always_inline]] NodalVelocity(const Lattice& lattice, const Bin& bin, const std::vector<double>& vx,
+                                         const std::vector<double>& vy)
     {
         for (int j = 0; j < S; ++j)
             for (int i = 0; i < S; ++i)
@@ -173,7 +234,7 @@ struct NodalVelocity
             }
     }
     template <class At>
-    std::array<Pack, 2> at(const At& at) const
+    [[gnu::always_inline]] std::array<Pack, 2> at(const At& at) const
     {
         Pack vx(0.0), vy(0.0);
         for (int j = 0; j < S; ++j)
@@ -187,7 +248,7 @@ struct NodalVelocity
     }
     /// Gradient of the increment over dt, with the dilatation that `strain` prescribes.
     template <class Strain, class At, class InBin>
-    Gradient<Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
+    [[gnu::always_inline]] Gradient<Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
     {
         Gradient<Pack> d{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
         [[maybe_unused]] Pack dilatation(0.0);

@@ -52,7 +52,7 @@ TEST(Square, IsThePolygon)
     const int number[] = {0, 1, 3, 2};
     for (int trial = 0; trial < 50; ++trial)
     {
-        double ux[4], uy[4];
+        std::array<double, 4> ux, uy;
         std::vector<Vec2> u(4);
         for (int k = 0; k < 4; ++k)
         {
@@ -60,7 +60,7 @@ TEST(Square, IsThePolygon)
             ux[number[k]] = u[k][0];
             uy[number[k]] = u[k][1];
         }
-        const Gradient<> fast = square_gradient(ux, uy, 1 / (2 * L)), slow = polygon_gradient(corners, u);
+        const Gradient<> fast = square_gradient<double>(ux, uy, 1 / (2 * L)), slow = polygon_gradient(corners, u);
         EXPECT_NEAR(fast.xx, slow.xx, 1e-13);
         EXPECT_NEAR(fast.yy, slow.yy, 1e-13);
         EXPECT_NEAR(fast.xy, slow.xy, 1e-13);

@@ -12,7 +12,7 @@ namespace
 Nodes two_nodes()
 {
     Nodes nodes(3);
-    nodes.active = {0, 2};
+    nodes.set_active({0, 2});
     nodes.mass = {2, 5, 4};
     nodes.vx = {1, 7, -1};
     nodes.fx = {10, 11, 12};
@@ -37,10 +37,10 @@ TEST(Gravity, RampsSmoothly)
 TEST(LocalDamping, AlwaysOpposesTheMotion)
 {
     const LocalDamping damping{0.8};
-    EXPECT_DOUBLE_EQ(damping.damped(10, 1), 2);
-    EXPECT_DOUBLE_EQ(damping.damped(-10, 1), -18);
-    EXPECT_DOUBLE_EQ(damping.damped(10, -1), 18);
-    EXPECT_DOUBLE_EQ(damping.damped(10, 0), 10);
+    EXPECT_DOUBLE_EQ(damping.damped(Pack(10.0), Pack(1.0))[0], 2);
+    EXPECT_DOUBLE_EQ(damping.damped(Pack(-10.0), Pack(1.0))[0], -18);
+    EXPECT_DOUBLE_EQ(damping.damped(Pack(10.0), Pack(-1.0))[0], 18);
+    EXPECT_DOUBLE_EQ(damping.damped(Pack(10.0), Pack(0.0))[0], 10);
 }
 
 TEST(Accelerate, ByForceOverMass)

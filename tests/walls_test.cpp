@@ -83,8 +83,9 @@ TEST(Wall, ReactionHoldsTheFace)
 {
     Fixture f("[[wall]]\nname = \"floor\"\nmin = [0.0, 0.2]\nmax = [4.0, 0.2]\nmotion = \"smooth\"\nfix = \"y\"\n");
     f.ops.begin_step(0, 0.1);
-    f.nodes.active.resize(f.nodes.mass.size());
-    std::iota(f.nodes.active.begin(), f.nodes.active.end(), 0u);
+    std::vector<std::uint32_t> all(f.nodes.mass.size());
+    std::iota(all.begin(), all.end(), 0u);
+    f.nodes.set_active(all);
     const std::size_t low = f.lattice.node(3, 0), high = f.lattice.node(3, 1);
     f.nodes.mass[low] = 3;
     f.nodes.fy[low] = -5;
@@ -103,7 +104,7 @@ TEST(Wall, ReactionBeforeDamping)
     Fixture f("[damping]\nlocal = 0.8\n[[boundary]]\nname = \"base\"\nwhere = \"y <= 0\"\nfix = \"xy\"\n");
     f.ops.begin_step(0, 0.1);
     const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 0)), free = static_cast<std::uint32_t>(f.lattice.node(3, 2));
-    f.nodes.active = {n, free};
+    f.nodes.set_active({n, free});
     f.nodes.fy[n] = -5;
     f.nodes.fx[n] = 2;
     f.nodes.vy[n] = f.nodes.vy[free] = 1;
@@ -121,7 +122,7 @@ TEST(Wall, DampingDoesNotMoveTheFace)
     Fixture f("[damping]\nlocal = 0.8\n[[wall]]\nname = \"floor\"\nmin = [0.0, 0.2]\nmax = [4.0, 0.2]\nmotion = \"smooth\"\nfix = \"y\"\n");
     f.ops.begin_step(0, 0.1);
     const auto low = static_cast<std::uint32_t>(f.lattice.node(3, 0)), high = static_cast<std::uint32_t>(f.lattice.node(3, 1));
-    f.nodes.active = {low, high};
+    f.nodes.set_active({low, high});
     f.nodes.mass[low] = 3;
     f.nodes.fy[low] = -5;
     f.nodes.fy[high] = -7;
@@ -168,7 +169,7 @@ TEST(Wall, OwnsWhatItDrives)
     Fixture f("[[boundary]]\nname = \"top\"\nwhere = \"y >= 3\"\nfix = \"y\"\n" + cap("hand_off"));
     f.ops.begin_step(0, 0.1);
     const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 6));
-    f.nodes.active = {n};
+    f.nodes.set_active({n});
     f.nodes.fy[n] = 5;
     f.ops.apply_forces(f.nodes, 0);
     EXPECT_EQ(f.ops.records()[0].reaction[1], 0);
