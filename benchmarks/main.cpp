@@ -165,7 +165,8 @@ int run(int argc, char** argv)
     bench_command->add_option("--points", bench_options.points, "numbers of points, about")->check(CLI::Range(16.0, 1e9));
     bench_command->add_option("--threads", bench_options.threads, "default: 1 and all")->check(CLI::Range(1, 1024));
     bench_command->add_option("--seconds", bench_options.seconds, "of each measurement")->check(CLI::PositiveNumber);
-    bench_command->add_option("-o,--output", bench_options.output, "write a CSV file, too; `testbed report` takes it as bench.csv");
+    bench_command->add_option("-o,--output", bench_options.output,
+                              "write a CSV file, too; named bench.csv in a folder given to `testbed report` it goes into the report");
     app.add_subcommand("list", "methods and material laws");
     app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
     app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
@@ -192,7 +193,14 @@ int run(int argc, char** argv)
         if (csv.empty())
             fmt::print("{}", text);
         else
-            write_text(csv, text);
+            try
+            {
+                write_text(csv, text);
+            }
+            catch (const OutputError& e)
+            {
+                throw SceneError(e.what());  // nothing was lost: the user's to mend
+            }
     }
     else if (bench_command->parsed())
         bench(bench_options, make_particle_solver);

@@ -82,6 +82,22 @@ bool holds_near(const Expression& condition, double x, double y, double reach)
     return false;
 }
 
+std::string place_named_in(const std::string& text, const Constants& constants)
+{
+    try
+    {
+        const mu::Parser parser = parser_with(text, constants);
+        for (const auto& [name, address] : parser.GetUsedVar())
+            if (name == "X" || name == "Y" || name == "x" || name == "y")
+                return name;
+        return "";
+    }
+    catch (const mu::Parser::exception_type& e)
+    {
+        rethrow(text, e);
+    }
+}
+
 double evaluate_constant(const std::string& text, const Constants& constants)
 {
     try

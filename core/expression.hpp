@@ -46,6 +46,9 @@ private:
 /// @throws ExpressionError where it is not a number
 bool holds_near(const Expression& condition, double x, double y, double reach);
 
+/// The first of X, Y, x, y that an expression depends on; empty if there is none. @throws ExpressionError
+std::string place_named_in(const std::string& text, const Constants& constants);
+
 /// Value of an expression of constants alone. @throws ExpressionError
 double evaluate_constant(const std::string& text, const Constants& constants);
 }  // namespace testbed

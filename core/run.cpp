@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <fstream>
 #include <unistd.h>
 
 namespace testbed
@@ -316,7 +315,15 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
     file.attribute("/", "reason", out.reason);
 
     file.commit();
-    write_text(std::filesystem::path(output).replace_extension(".xdmf"), observer.xdmf(std::filesystem::path(output).filename().string()));
+    try
+    {
+        write_text(std::filesystem::path(output).replace_extension(".xdmf"),
+                   observer.xdmf(std::filesystem::path(output).filename().string()));
+    }
+    catch (const OutputError& e)
+    {
+        throw OutputError(fmt::format("{}; the result itself is whole", e.what()));
+    }
 
     if (!options.quiet)
         for (const MaterialSpec& m : scene.materials)

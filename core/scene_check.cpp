@@ -117,21 +117,34 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
         }
 }
 
-/// Two boxes in one place would count their mass twice.
+/// Two bodies in one place would count their mass twice. Boxes are compared as such, other shapes by the points of either in the other.
 void check_overlap(const Scene& scene, Problems& problems)
 {
     const double slack = 1e-6 * scene.grid.cell_size;
+    const auto boxes_overlap = [&](const BodySpec& a, const BodySpec& b)
+    {
+        bool overlap = true;
+        for (std::size_t d = 0; d < 2; ++d)
+            overlap &= (*a.min)[d] < (*b.max)[d] - slack && (*b.min)[d] < (*a.max)[d] - slack;
+        return overlap;
+    };
+    const auto has_points_in = [&](const BodySpec& a, const BodySpec& b)
+    {
+        const auto points = fill(scene, a);
+        return std::any_of(points.begin(), points.end(), [&](const Vec2& p) { return contains(b, p, -slack); });
+    };
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
         for (std::size_t other = 0; other < k; ++other)
         {
             const BodySpec &a = scene.bodies[other], &b = scene.bodies[k];
-            if (!a.min || !a.max || !b.min || !b.max || a.inside == b.name || b.inside == a.name)
-                continue;
-            bool overlap = true;
-            for (std::size_t d = 0; d < 2; ++d)
-                overlap &= (*a.min)[d] < (*b.max)[d] - slack && (*b.min)[d] < (*a.max)[d] - slack;
-            if (overlap)
-                problems.add(fmt::format("body[{}]", k), fmt::format("body '{}' overlaps body '{}'", b.name, a.name));
+            if (!a.inside.empty() || !b.inside.empty())
+                continue;  // see check_inclusion()
+            const bool boxes = a.min && a.max && b.min && b.max;
+            if (boxes ? boxes_overlap(a, b) : has_points_in(a, b) || has_points_in(b, a))
+                problems.add(fmt::format("body[{}]", k),
+                             fmt::format("body '{0}' overlaps body '{1}'; if it is meant to take the place of points of "
+                                         "'{1}', it needs inside = \"{1}\"",
+                                         b.name, a.name));
         }
 }
 
@@ -309,6 +322,11 @@ void check_wall(const Scene& scene, const WallSpec& wall, const std::string& key
         return;
     try
     {
+        if (wall.velocity)
+            for (const std::string& text : *wall.velocity)
+                if (const std::string name = place_named_in(text, scene.expression_constants()); !name.empty())
+                    return problems.add(key + ".velocity",
+                                        fmt::format("'{}' is not known here: a wall moves as a whole, with a velocity of t", name));
         const auto path = wall_path(wall, scene.expression_constants(), scene.time.end);
         for (std::size_t n = 0; n < path.size(); ++n)
             if (const Vec2& u = path[n]; outside({wall.min[0] + u[0], wall.min[1] + u[1]}, {wall.max[0] + u[0], wall.max[1] + u[1]}))
@@ -482,6 +500,22 @@ void check_limits(const Scene& scene, Problems& problems)
         if (m.softening && m.softening->band_thickness && scene.grid.cell_size < *m.softening->band_thickness)
             problems.warn(fmt::format("material[{}].softening.band_thickness", k),
                           fmt::format("crack-band scaling needs cells at least as large as the band, {} m", *m.softening->band_thickness));
+    }
+    if (family == "mpm" && scene.mpm.shape == "bspline")
+    {
+        const auto inside = [&](const Vec2& low, const Vec2& high)
+        {
+            const double slack = 1e-6 * scene.grid.cell_size;
+            bool is_inside = true;
+            for (std::size_t k = 0; k < 2; ++k)
+                is_inside &= high[k] > scene.grid.origin[k] + slack && low[k] < scene.grid.origin[k] + scene.grid.size[k] - slack;
+            return is_inside;
+        };
+        for (std::size_t k = 0; k < scene.walls.size(); ++k)
+            if (inside(scene.walls[k].min, scene.walls[k].max))
+                problems.warn(fmt::format("wall[{}]", k),
+                              "quadratic B-splines are right at the edges of the lattice alone: at a wall inside it the "
+                              "velocity that points see is not the wall's, and the first cells beside it are wrong");
     }
     const bool locks = (family == "mpm" && scene.mpm.strain == "four_point") || (family == "fem" && scene.fem.degree == 1);
     for (std::size_t k = 0; k < scene.materials.size() && locks; ++k)

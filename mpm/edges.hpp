@@ -5,8 +5,6 @@
 
 #include "core/grid.hpp"
 
-#include <cmath>
-
 namespace testbed
 {
 class LatticeEdges

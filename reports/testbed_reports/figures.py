@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
 
 from . import components, metrics
 from .components import of_snapshot
 from .convergence import fit_order
 from .curves import curve, history
-from .drawing import (QUANTITY_NAMES, Drawing, FigureError, axis_scale, by_series, chosen, label_of, log_y, name_of, one_size, rails, short,
+from .drawing import (Drawing, FigureError, axis_scale, by_series, chosen, label_of, log_y, name_of, one_size, rails, short,
                       sizes_axis, snapshot_of, where_of_title, with_result, with_unit)
 from .maps import field_maps
 from .power_law import power_law

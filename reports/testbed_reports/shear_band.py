@@ -175,7 +175,8 @@ def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
     free = np.abs(first.distance(x)) > 1.5 * first.width
     if len(conjugate) == 2 and all(band.clear for band in conjugate) or free.sum() < 10:
         return conjugate
-    return strong([first, _search(x[free], strain[free], volume[free], spacing)])
+    apart = strong([first, _search(x[free], strain[free], volume[free], spacing)])
+    return max(apart, conjugate, key=len) if not all(band.clear for band in apart) else apart
 
 
 def widths(band):

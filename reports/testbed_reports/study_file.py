@@ -290,6 +290,13 @@ def read_study(path, need_scene=True):
 
     def check_figure(entry, index):
         """What one key asks of another."""
+        if entry["kind"] == "work_precision":
+            axes = (entry.get("x", "solve_s"), entry.get("y", "error"))
+            if axes not in (("solve_s", "error"), ("dofs", "error"), ("dofs", "solve_s")):
+                fail(f"'x' and 'y' in [[figure]] number {index + 1} must be solve_s and error, dofs and error, or dofs and solve_s",
+                     "x" if "x" in entry else "y", "figure", index)
+            if entry.get("exact") == 0:
+                fail(f"'exact' in [[figure]] number {index + 1} must not be zero: errors are relative to it", "exact", "figure", index)
         check_list(entry, "snapshot", int, "whole numbers", index)
         check_list(entry, "curves", TEXT, "names of [[report.curve]]", index)
         check_list(entry, "levels", TEXT + NUMBER, "numbers or names of report.reference", index)

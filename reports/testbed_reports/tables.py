@@ -11,7 +11,7 @@ from . import metrics
 from .convergence import fit_order, fit_power, pairwise_orders
 from .dataset import groups
 from .targets import digits_of, mean_by_size, number, values_by_size
-from .work_precision import reach
+from .work_precision import is_busy, reach
 
 
 @dataclass
@@ -172,7 +172,7 @@ def performance_table(study):
             perf = [r.result.performance for r in own]
             loads = [r.result.provenance.get("load_average") for r in own]
             loads = [float(v) for v in loads if isinstance(v, (int, float))]
-            busy = bool(cores and loads and max(loads) > cores)
+            busy = any(is_busy(r, cores) for r in own)
             busy_any = busy_any or busy
             rows.append([label, f"{size:g}", _whole(perf[0].get("points")), _whole(perf[0].get("steps")),
                          *(_range([p.get(k) for p in perf]) for k in ("solve_s", "setup_s", "output_s")),

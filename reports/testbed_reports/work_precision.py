@@ -17,7 +17,7 @@ ACCURACIES = (0.01, 0.001)
 
 @dataclass
 class Cost:
-    """One setting of a method: its error and what it costs, medians over repeats, with the range of the times."""
+    """One setting of a method: its error, the mean over repeats, and what it costs: the median time and its range."""
     L: float
     settings: dict
     error: float
@@ -34,7 +34,8 @@ def error_of(run, entry):
     return abs(value / entry["exact"] - 1.0) if "exact" in entry else abs(value)
 
 
-def _is_busy(run, cores):
+def is_busy(run, cores):
+    """Whether the load average at the start of a run was above the number of cores."""
     load = run.result.provenance.get("load_average")
     return bool(cores and isinstance(load, (int, float)) and load > cores)
 
@@ -55,7 +56,7 @@ def costs_of(runs, entry, cores=None):
         settings = {k: v for k, v in values.items() if k not in ("repeat", "dt", "L", "grid.cell_size", "case", "scene", "method", "variant", "seed")}
         times = [seconds for _, _, seconds in same]
         costs.append(Cost(values.get("L"), settings, float(np.mean([error for _, error, _ in same])), float(np.median(times)), min(times), max(times),
-                          float(same[0][0].result.performance.get("dofs", math.nan)), any(_is_busy(run, cores) for run, _, _ in same)))
+                          float(same[0][0].result.performance.get("dofs", math.nan)), any(is_busy(run, cores) for run, _, _ in same)))
     return sorted(costs, key=lambda c: (-(c.L or 0), c.solve_s)), lost
 
 
@@ -73,8 +74,6 @@ def work_precision(study, entry, style):
     """Error against seconds or unknowns, or seconds against unknowns. Where a method ran with several settings at one cell size, all are
     shown and its line joins those that nothing of its own beats."""
     x, y = entry.get("x", "solve_s"), entry.get("y", "error")
-    if x not in AXES or y not in ("error", "solve_s") or x == y:
-        raise FigureError("'x' must be 'solve_s' or 'dofs', 'y' 'error' or 'solve_s', and not the same")
     runs, notes = chosen(study, entry), []
     series, failing = {}, {}
     for label, own in by_series(runs, entry, style).items():
@@ -99,7 +98,8 @@ def work_precision(study, entry, style):
     if y == "error":
         best = front(everything + [p for label in exact for p in of[label]])
         best = [p for p in best if p[1] > metrics.ROUNDING or not is_error]
-        axis.plot(*zip(*best), color="0.82", linewidth=5.0, solid_capstyle="round", zorder=0) if best else None
+        if best:
+            axis.plot(*zip(*best), color="0.82", linewidth=5.0, solid_capstyle="round", zorder=0)
         notes.append("The broad line is the Pareto front of all methods")
     for label, costs in series.items():
         handles.append(Line2D([], [], **style.of(label), label=texts[label]))
@@ -163,7 +163,7 @@ def reach(study, entry):
     series = {}
     for run in runs:
         series.setdefault(run.name, []).append(run)
-    header, rows, busy = ["variant"], [], False
+    header, rows = ["variant"], []
     for accuracy in ACCURACIES:
         header += [f"{100 * accuracy:g} %: L [m]", "settings", "solve [s]", "× fastest"]
     found = {label: costs_of(own, entry, study.plan.get("cores"))[0] for label, own in series.items()}
@@ -176,7 +176,6 @@ def reach(study, entry):
                 least = min((c.error for c in costs), default=math.nan)
                 row += ["not reached", f"best {number(100 * least, 2)} %" if math.isfinite(least) else "no number", "", ""]
                 continue
-            busy = busy or best.busy
             settings = ", ".join(f"{k.rsplit('.', 1)[-1]} {v:g}" for k, v in best.settings.items() if isinstance(v, (int, float)) and k != "constants.ppc")
             row += [f"{best.L:g}", settings, f"{best.solve_s:.3g}" + (" busy" if best.busy else ""), f"{best.solve_s / fastest[accuracy]:.1f}"]
         rows.append(row)

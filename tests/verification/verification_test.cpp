@@ -85,7 +85,7 @@ Errors errors(const State& s)
     return {std::sqrt(ds / es), l1 / static_cast<double>(q.count) / largest, std::sqrt(du / eu)};
 }
 
-const std::vector<std::string> particle_methods{"lpfdm-2000", "lpfdm", "mpm-linear", "mpm-linear-bbar", "mpm-cpgimp"};
+const std::vector<std::string> particle_methods{"lpfdm-2000", "lpfdm", "mpm-linear", "mpm-linear-bbar", "mpm-bspline", "mpm-cpgimp"};
 }  // namespace
 
 /// Uniaxial stress of one cell, in equilibrium with its upper half: exact up to the strain, 2e-8 (by hand).
