@@ -8,6 +8,7 @@ from collections import Counter
 from datetime import datetime, timezone
 from pathlib import Path
 
+from . import bench
 from .dataset import read_study_folder, write_atomically
 from .figures import FigureError, draw, label_of
 from .page import inline_svg, render
@@ -28,7 +29,7 @@ def find_studies(folders):
             inside = [folder]
         else:
             inside = sorted(p.parent for p in folder.glob("*/study.toml"))
-        if not inside:
+        if not inside and not (folder / bench.FILE).is_file():
             raise StudyError(f"{folder}: holds no study (no study.toml)")
         found += inside
     return list(dict.fromkeys(p.resolve() for p in found))
@@ -88,6 +89,16 @@ def _figure_labels(studies):
     return [label for label in labels if label]
 
 
+def _bench_labels(benches):
+    labels = []
+    for path in benches:
+        try:
+            labels += [row["method"] for row in bench.read_bench(path)[1]]
+        except (OSError, bench.BenchError):
+            continue  # told where its section is made
+    return list(dict.fromkeys(labels))
+
+
 def _study_section(study, style, out, command, failures):
     figures, used = [], Counter()
     for entry in study.spec.figures:
@@ -124,6 +135,31 @@ def _study_section(study, style, out, command, failures):
             "summary": summary, "figures": figures, "tables": tables}
 
 
+def _bench_section(path, style, out, failures):
+    """The section of one bench.csv; None when it cannot be used."""
+    try:
+        comment, rows = bench.read_bench(path)
+    except (OSError, bench.BenchError) as error:
+        failures.append([path.parent.name, bench.FILE, "unreadable", str(error).replace(str(path.parent) + os.sep, "")])
+        return None
+    name = f"{slug(path.parent.name)}_bench_rates"
+    with plt.rc_context(RC):
+        figure = bench.rates_figure(rows, style)
+        figure.savefig(out / "figures" / f"{name}.pdf", dpi=300, metadata={"CreationDate": None, "Creator": None, "Producer": None})
+        shown = {"title": "Particle-steps per second against the number of points", "image": inline_svg(figure), "error": "", "width": "page",
+                 "rem": 62, "anchor": f"figure-{name}", "paper": "", "shows": "",
+                 "caption": f"Fastest of ten slices; full lines one thread, thin lines more. {comment}. Made by: testbed bench"}
+    plt.close("all")
+    tables = [t for t in (bench.rates_table(rows), bench.cost_table(rows)) if t]
+    for table in tables:
+        base = out / "tables" / f"{slug(path.parent.name)}_bench_{table.name}"
+        write_atomically(base.with_suffix(".csv"), as_csv(table))
+        write_atomically(base.with_suffix(".tex"), as_latex(table))
+    return {"anchor": f"bench-{slug(path.parent.name)}", "title": "Speed", "purpose": "The particle methods alone, in one process, beside the "
+            "bandwidth of the memory." + (" Measured on a busy machine." if bench.is_busy(comment) else ""), "summary": f"{len(rows)} measurements.",
+            "figures": [shown], "tables": tables}
+
+
 def _write_gallery(out, title, sections):
     """Writes gallery.html of the figures with words of a paper or of the study's author; False when there are none."""
     shown = [section | {"figures": [f for f in section["figures"] if f["paper"] or f["shows"]]} for section in sections]
@@ -152,7 +188,8 @@ def build(folders, out, command):
             if not run.completed:
                 failures.append([study.name, run.id, run.status, run.reason])
             failures += [[study.name, run.id, "number missing", error] for error in run.errors]
-    style = Style(_figure_labels(studies))
+    benches = [path for path in (Path(folder) / bench.FILE for folder in folders) if path.is_file()]
+    style = Style(_figure_labels(studies) + _bench_labels(benches))
     verdicts = [(study, judge_all(study)) for study in studies]
     sections = [_study_section(study, style, out, command, failures) for study in studies]
     for (study, judged), section in zip(verdicts, sections):
@@ -160,12 +197,13 @@ def build(folders, out, command):
             base = out / "tables" / f"{slug(study.name)}_{slug(table.name)}"
             write_atomically(base.with_suffix(".csv"), as_csv(table))
             write_atomically(base.with_suffix(".tex"), as_latex(table))
+    sections += [section for path in benches if (section := _bench_section(path, style, out, failures))]
     rows, warnings = provenance(studies, command)
     flat = [(study.name, v) for study, judged in verdicts for v in judged]
     counted = Counter(v.verdict for _, v in flat)
     left_out = [[s.name, e.get("variant") or "", ", ".join(f"{k} = {v}" for k, v in e.get("axes", {}).items()),
                  e.get("reason", "")] for s in studies for e in s.left_out]
-    titles = [s.spec.title for s in studies]
+    titles = [section["title"] for section in sections]
     title = titles[0] if len(titles) == 1 else "Testbed report"
     gallery = _write_gallery(out, title, sections)
     page = render("template.html", title=title, gallery=gallery, provenance=rows, warnings=warnings,

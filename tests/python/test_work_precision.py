@@ -1,0 +1,90 @@
+"""Costs, fronts and what reaches an accuracy; the section of testbed bench."""
+import pytest
+from synthetic import write_study
+from testbed_reports import bench
+from testbed_reports.dataset import read_study_folder
+from testbed_reports.report import build
+from testbed_reports.work_precision import Cost, cheapest, costs_of, error_of, front, reach
+
+FIGURES = """
+[[figure]]
+kind = "work_precision"
+quantity = "stress"
+norm = "l2"
+[[figure]]
+kind = "work_precision"
+quantity = "stress"
+norm = "l2"
+x = "dofs"
+[[figure]]
+kind = "work_precision"
+quantity = "stress"
+norm = "l2"
+x = "dofs"
+y = "solve_s"
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return read_study_folder(write_study(tmp_path_factory.mktemp("wp") / "column", FIGURES, sizes=(2.0, 1.0, 0.5)))
+
+
+def test_front_keeps_what_nothing_beats():
+    assert front([(1, 5), (2, 6), (3, 2), (4, 2), (5, 1)]) == [(1, 5), (3, 2), (5, 1)]
+
+
+def cost(error, seconds, busy=False):
+    return Cost(1.0, {}, error, seconds, seconds, seconds, 10.0, busy)
+
+
+def test_cheapest_is_the_fastest_that_is_good_enough():
+    costs = [cost(0.02, 1.0), cost(0.009, 3.0), cost(0.005, 2.0)]
+    assert cheapest(costs, 0.01).solve_s == 2.0
+    assert cheapest(costs, 0.001) is None
+
+
+def test_error_from_an_exact_value(study):
+    run = next(r for r in study.runs if r.completed)
+    entry = {"quantity": "stress", "norm": "l2"}
+    assert error_of(run, entry) == run.value("stress", "l2")
+    assert error_of(run, {**entry, "exact": 2 * run.value("stress", "l2")}) == pytest.approx(0.5)
+
+
+def test_repeats_are_one_cost_with_the_median_time(study):
+    runs = [r for r in study.runs if r.name == "lpfdm"]
+    costs, lost = costs_of(runs, {"quantity": "stress", "norm": "l2"})
+    assert len(costs) == 3 and not lost
+    assert all(c.least_s <= c.solve_s <= c.most_s and c.dofs > 0 for c in costs)
+    assert [c.L for c in costs] == [2.0, 1.0, 0.5]
+
+
+def test_reach_names_the_fastest(study):
+    header, rows, _ = reach(study, study.spec.figures[0])
+    assert len(header) == 9
+    ratios = [float(row[4]) for row in rows if row[4]]
+    assert min(ratios) == 1.0
+    assert all(row[2].startswith("best ") or row[2] == "no number" for row in rows if row[1] == "not reached")
+
+
+def bench_csv(folder, comment="# cpu, 2 cores, busy"):
+    rows = [f"lpfdm,{law},{n},{n // 16},{threads},100,{1e-8 * n},{0.9e-8 * n},1e8,90,112,1e10,0.5,{1e-7 * n},\"a: 1; b: 2\""
+            for law in ("elastic", "mohr_coulomb") for n in (10000, 100000, 1000000) for threads in (1, 2)]
+    folder.mkdir(exist_ok=True)
+    (folder / "bench.csv").write_text("\n".join([comment, "method,law," + ",".join(bench.NUMBERS) + ",phases", *rows]) + "\n")
+    return folder
+
+
+def test_bench_in_a_report(tmp_path):
+    page = build([bench_csv(tmp_path / "b")], tmp_path / "out", "testbed report b").read_text()
+    assert "Measured on a busy machine" in page and "Triad bandwidth: 10.0 GB/s with 1 thread, 10.0 GB/s with 2 threads" in page
+    assert (tmp_path / "out/figures/b_bench_rates.pdf").is_file() and (tmp_path / "out/tables/b_bench_cost.csv").is_file()
+    table = bench.cost_table(bench.read_bench(tmp_path / "b/bench.csv")[1])
+    assert table.rows[0][2].startswith("1.00") and table.rows[0][3].startswith("1.00")
+
+
+def test_a_broken_bench_is_told(tmp_path):
+    folder = bench_csv(tmp_path / "b")
+    (folder / "bench.csv").write_text("method,law\nlpfdm,elastic\n")
+    page = build([folder], tmp_path / "out", "testbed report b").read_text()
+    assert "not written by testbed bench" in page
