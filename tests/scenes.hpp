@@ -112,7 +112,7 @@ velocity = ["0.6*sin(5*X+Y)", "0.5*cos(7*Y-3*X)"]
 name = "two"
 material = "stiff"
 shape = "disk"
-center = [1.2, 0.3]
+center = [1.25, 0.3]
 radius = 0.6
 points_per_cell = )toml" +
            std::to_string(points_per_cell) + R"toml(

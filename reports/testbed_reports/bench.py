@@ -3,6 +3,7 @@ import csv
 from pathlib import Path
 
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from .convergence import fit_power
 from .style import WIDTH, frame, legend_below, legend_shape
@@ -59,7 +60,7 @@ def rates_figure(rows, style):
     """Rate against points, a panel per law; full lines one thread, thin ones more."""
     laws, methods = list(dict.fromkeys(r["law"] for r in rows)), list(dict.fromkeys(r["method"] for r in rows))
     columns, lines = legend_shape(methods, WIDTH["page"])
-    figure, axes = frame(WIDTH["page"], 2.3, lines, columns=len(laws), left=0.62, right=0.12)
+    figure, axes = frame(WIDTH["page"], 2.3, lines, columns=len(laws), rails=1, left=0.62, right=0.12, sharey=True)
     for axis, law in zip(axes[0], laws):
         for method in methods:
             for threads in sorted({r["threads"] for r in rows}):
@@ -69,7 +70,8 @@ def rates_figure(rows, style):
                     axis.plot(*zip(*own), **{**style.of(method), **({} if threads == 1 else {"linewidth": 0.6, "markersize": 2.5})})
         axis.set_xscale("log")
         axis.set_yscale("log")
-        axis.set_title(law.replace("_", "-"))
+        axis.set_title(law.replace("_", "-").capitalize(), fontsize=8, pad=3)
+        axis.yaxis.set_minor_formatter(NullFormatter())
         axis.set_xlabel("Points")
     axes[0, 0].set_ylabel("Particle-steps per second [10⁶/s]")
     legend_below(figure, [Line2D([], [], **style.of(m), label=m) for m in methods], columns)

@@ -82,9 +82,11 @@ def _plastic(snapshot):
 
 def shear_band(result):
     """Number, inclination and width of the bands of the last snapshot; nan where there is no band."""
-    snapshot = result.final
+    snapshot, most = result.final, result.reference.get("bands", 2)
+    if most not in (1, 2):
+        raise MetricError(f"report.reference.bands: 1 or 2 is asked, not {most:g}")
     bands = find_bands(snapshot["initial_position"][:, :2], _plastic(snapshot), snapshot["initial_volume"], _spacing(snapshot),
-                       int(result.reference.get("bands", 2)))
+                       int(most))
     found = [widths(band) for band in bands]
     rows = {("band_count", ""): len(bands)}
     for k, name in enumerate(("first", "second")):
