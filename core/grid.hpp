@@ -68,10 +68,12 @@ public:
     explicit Nodes(std::size_t n) : mass(n), vx(n), vy(n), fx(n), fy(n) {}
     const std::vector<std::uint32_t>& active() const { return active_; }  ///< ascending
     const std::vector<Run>& runs() const { return runs_; }                ///< the same
+    std::size_t version() const { return version_; }                      ///< grows with each set_active()
     void set_active(std::vector<std::uint32_t> ascending)
     {
         active_ = std::move(ascending);
         runs_ = runs_of(active_, mass.size() + 1);
+        ++version_;
     }
     /// kernel(i, lanes) for the active nodes [i, i + lanes).
     template <class Kernel>
@@ -87,6 +89,7 @@ public:
 private:
     std::vector<std::uint32_t> active_;
     std::vector<Run> runs_;
+    std::size_t version_ = 0;
 };
 
 /// 1/m, and zero for nodes that carry no mass.

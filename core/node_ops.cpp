@@ -62,7 +62,8 @@ void NodeOps::begin_step(double t, double dt)
     for (std::size_t k = 0; k < walls_.size(); ++k)
     {
         Restraint& own = restraints_[first_wall_ + k];
-        walls_[k].begin_step(t, dt, own);
+        if (walls_[k].begin_step(t, dt, own))
+            seen_ = 0;
         if (const auto& nodes = walls_[k].new_nodes(); !nodes.empty())
             if (const Restraint* other = in_the_way(nodes, own, restraints_))
                 throw Diverged(
@@ -75,6 +76,7 @@ void NodeOps::apply_forces(Nodes& nodes, double t)
 {
     if (gravity_)
         gravity_->apply(nodes, t);
+    find_used(nodes);
     bool has_pairs = false;
     std::for_each(restraints_.rbegin(), restraints_.rend(),  // a node of two is driven by the later one
                   [&](Restraint& r) {

@@ -91,8 +91,9 @@ public:
     /// Gravity, the reactions of supports and walls, and damping of what is then out of balance.
     void apply_forces(Nodes& nodes, double t);
     /// Supports and walls prescribe the velocity.
-    void restrain(const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy) const
+    void restrain(const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy)
     {
+        find_used(nodes);
         for (const Restraint& r : restraints_)
             r.drive(nodes, vx, vy);
     }
@@ -101,11 +102,24 @@ public:
     const std::vector<Restraint>& restraints() const { return restraints_; }
 
 private:
+    void find_used(const Nodes& nodes)
+    {
+        if (nodes.version() == seen_)
+            return;
+        seen_ = nodes.version();
+        for (Restraint& r : restraints_)
+        {
+            r.x.use(nodes.active());
+            r.y.use(nodes.active());
+        }
+    }
+
     std::optional<Gravity> gravity_;
     std::optional<LocalDamping> damping_;
     std::vector<Restraint> restraints_;  ///< of the boundaries, then of the walls: where two prescribe, the later one does
     std::vector<Wall> walls_;
     std::size_t first_wall_ = 0;
+    std::size_t seen_ = 0;  ///< version of the nodes for which the restraints know which they use; 0: they do not
 };
 
 /// Eqs. (12), (14): v += F / m dt.

@@ -3,7 +3,9 @@
 
 #include "core/grid.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 
 namespace testbed
@@ -18,16 +20,22 @@ struct FacePair
 /// Restrains one component, x or y, at some nodes.
 struct ComponentRestraint
 {
-    std::vector<std::uint32_t> nodes;
+    std::vector<std::uint32_t> nodes;  ///< ascending
+    std::vector<std::uint32_t> used;   ///< those that are in use: an empty part of the lattice costs nothing
     std::vector<FacePair> pairs;
     double velocity = 0;  ///< [m/s]
 
     bool empty() const { return nodes.empty() && pairs.empty(); }
 
+    void use(const std::vector<std::uint32_t>& active)
+    {
+        used.clear();
+        std::set_intersection(nodes.begin(), nodes.end(), active.begin(), active.end(), std::back_inserter(used));
+    }
     /// Brings the velocity v to the prescribed one: at a pair by the impulse that the face passes on to both nodes.
     void drive(const Nodes& carrier, std::vector<double>& v) const
     {
-        for (const auto i : nodes)
+        for (const auto i : used)
             v[i] = velocity;
         for (const FacePair& p : pairs)
         {
@@ -40,7 +48,7 @@ struct ComponentRestraint
     double react_at_nodes(std::vector<double>& f) const
     {
         double reaction = 0;
-        for (const auto i : nodes)
+        for (const auto i : used)
         {
             reaction -= f[i];
             f[i] = 0;

@@ -18,10 +18,12 @@ Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice) : s
         velocity_.emplace(*spec.velocity, scene.expression_constants());
 }
 
-void Wall::begin_step(double t, double dt, Restraint& restraint)
+bool Wall::begin_step(double t, double dt, Restraint& restraint)
 {
     new_nodes_.clear();
-    if (const Region now = region(t); now != taken_)
+    const Region now = region(t);
+    const bool others = now != taken_;
+    if (others)
     {
         check_on_lattice(now, t);
         take_nodes(now, restraint);
@@ -30,11 +32,12 @@ void Wall::begin_step(double t, double dt, Restraint& restraint)
         taken_ = now;
     }
     if (!velocity_)
-        return;
+        return others;
     const Vec2 v = (*velocity_)({.t = t + 0.5 * dt});
     travel_rate_ = v;
     restraint.x.velocity = spec_.fix == "y" ? 0 : v[0];
     restraint.y.velocity = spec_.fix == "x" ? 0 : v[1];
+    return others;
 }
 
 void Wall::end_step(double dt)

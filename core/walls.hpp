@@ -12,9 +12,10 @@ class Wall
 public:
     Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice);
 
-    /// Sets the restraint to the nodes that the wall covers at time t, and to its velocity in the middle of the coming step.
+    /// Sets the restraint to the nodes that the wall covers at time t, and to its velocity in the middle of the coming step. Returns
+    /// whether they are others than before.
     /// @throws Diverged if the wall has left the lattice
-    void begin_step(double t, double dt, Restraint& restraint);
+    bool begin_step(double t, double dt, Restraint& restraint);
     void end_step(double dt);
 
     /// Since the start [m].

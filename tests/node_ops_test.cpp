@@ -83,15 +83,23 @@ where = "x <= -1"
 fix = "x"
 )");
     const Lattice lattice = make_lattice(scene.grid);
-    const NodeOps ops(scene, lattice);
+    NodeOps ops(scene, lattice);
     EXPECT_EQ(ops.restraints().size(), 2u);
     std::vector<double> vx(lattice.nodes(), 1), vy(lattice.nodes(), 1);
-    ops.restrain(Nodes(lattice.nodes()), vx, vy);
+    Nodes nodes(lattice.nodes());
+    std::vector<std::uint32_t> all(lattice.nodes() - 1);  // but the last one
+    std::iota(all.begin(), all.end(), 0u);
+    nodes.set_active(all);
+    ops.restrain(nodes, vx, vy);
     EXPECT_EQ(vy[lattice.node(3, 0)], 0);
     EXPECT_EQ(vx[lattice.node(0, 3)], 0);
     EXPECT_EQ(vy[lattice.node(0, 3)], 1);
     EXPECT_EQ(vx[lattice.node(3, 3)], 1);
     EXPECT_EQ(vx[lattice.node(-1, 3)], 0);  // the ring around the lattice, too
+    nodes.set_active({});
+    std::fill(vy.begin(), vy.end(), 1.0);
+    ops.restrain(nodes, vx, vy);
+    EXPECT_EQ(vy[lattice.node(3, 0)], 1);  // a node that is not in use costs nothing
 }
 
 TEST(NodeOps, WhatASceneDoesNotHaveIsAbsent)

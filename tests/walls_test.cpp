@@ -30,6 +30,9 @@ struct Fixture
           nodes(lattice.nodes())
     {
         std::fill(nodes.mass.begin(), nodes.mass.end(), 2.0);
+        std::vector<std::uint32_t> all(nodes.mass.size());
+        std::iota(all.begin(), all.end(), 0u);
+        nodes.set_active(all);
     }
     void step(double t, double dt)
     {
@@ -83,9 +86,6 @@ TEST(Wall, ReactionHoldsTheFace)
 {
     Fixture f("[[wall]]\nname = \"floor\"\nmin = [0.0, 0.2]\nmax = [4.0, 0.2]\nmotion = \"smooth\"\nfix = \"y\"\n");
     f.ops.begin_step(0, 0.1);
-    std::vector<std::uint32_t> all(f.nodes.mass.size());
-    std::iota(all.begin(), all.end(), 0u);
-    f.nodes.set_active(all);
     const std::size_t low = f.lattice.node(3, 0), high = f.lattice.node(3, 1);
     f.nodes.mass[low] = 3;
     f.nodes.fy[low] = -5;
