@@ -72,7 +72,7 @@ def front(points):
 
 def work_precision(study, entry, style):
     """Error against seconds or unknowns, or seconds against unknowns. Where a method ran with several settings at one cell size, all are
-    shown and its line joins those that nothing of its own beats."""
+    shown and its line joins those that nothing of its own beats (against unknowns: the fastest)."""
     x, y = entry.get("x", "solve_s"), entry.get("y", "error")
     runs, notes = chosen(study, entry), []
     series, failing = {}, {}
@@ -111,7 +111,10 @@ def work_precision(study, entry, style):
         if not costs:
             continue
         several = len({c.L for c in costs}) < len(costs)
-        line = front(of[label]) if several and y == "error" else sorted(of[label])
+        least = {}
+        for at, value in of[label]:
+            least[at] = min(value, least.get(at, math.inf))
+        line = front(of[label]) if several and y == "error" else sorted(least.items()) if several else sorted(of[label])
         if several:
             axis.plot(*zip(*of[label]), **{**look, "linestyle": "none", "markersize": 2.5, "alpha": 0.45})
         axis.plot(*zip(*line), **look)
@@ -119,8 +122,8 @@ def work_precision(study, entry, style):
             data = np.array([(c.solve_s, c.error, c.solve_s - c.least_s, c.most_s - c.solve_s) for c in costs]).T
             axis.errorbar(data[0], data[1], xerr=data[2:], color=look["color"], linestyle="none", elinewidth=0.7, capsize=1.8)
         if any(c.busy for c in costs):
-            axis.plot(*zip(*[p for p, c in zip(of[label], costs) if c.busy]), linestyle="none", marker="o", markersize=8, markerfacecolor="none",
-                      markeredgecolor=RAIL)
+            axis.plot(*zip(*[p for p, c in zip(of[label], costs) if c.busy]), linestyle="none", marker="o", markersize=6, markerfacecolor="none",
+                      markeredgecolor="0.7", markeredgewidth=0.5, zorder=1)
     if any(c.busy for costs in series.values() for c in costs):
         notes.append("Circled: timed on a busy machine")
     axis.set_xscale("log")
