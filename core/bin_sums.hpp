@@ -9,14 +9,13 @@ namespace testbed
 /// Sums of the points of one bin, where they are now. A loop of its own: with the sums of several cells or nodes beside what else a pass
 /// computes, the registers would not do, and the points of a bin are still in the nearest cache.
 template <class Support, class Sums>
-[[gnu::always_inline]] inline void sum_bin(const Lattice& lattice, const Body& body, const Bin& bin, double* to)
+TESTBED_INLINE inline void sum_bin(const Lattice& lattice, const Body& body, const Bin& bin, double* to)
 {
     const BinFrame frame(lattice, bin);
     Sums sums(lattice, bin);
-    for_each_pack(
-        bin.begin, bin.end, [&](std::size_t p, const auto& lanes) __attribute__((always_inline)) {
-            sums.add(body, p, lanes, frame.template corner<Support>(body.points, p, lanes));
-        });
+    for_each_pack(bin.begin, bin.end,
+                  [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                  { sums.add(body, p, lanes, frame.template corner<Support>(body.points, p, lanes)); });
     sums.write(body, bin, to);
 }
 
@@ -41,13 +40,14 @@ public:
         std::size_t first = 0, first_before = 0;
         for (const Body& body : bodies)
         {
-            parallel_for(
-                body.bins.list().size(), [&](std::size_t b) __attribute__((flatten)) {
-                    if (const auto old = body.bins.unchanged(b); old && !before_.empty())
-                        std::copy_n(&before_[(first_before + *old) * numbers], numbers, of(first + b));
-                    else
-                        sum_bin<Support, Sums>(lattice, body, body.bins.list()[b], of(first + b));
-                });
+            parallel_for(body.bins.list().size(),
+                         [&](std::size_t b) TESTBED_FLATTEN
+                         {
+                             if (const auto old = body.bins.unchanged(b); old && !before_.empty())
+                                 std::copy_n(&before_[(first_before + *old) * numbers], numbers, of(first + b));
+                             else
+                                 sum_bin<Support, Sums>(lattice, body, body.bins.list()[b], of(first + b));
+                         });
             first += body.bins.list().size();
             first_before += body.bins.size_before();
         }

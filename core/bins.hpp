@@ -200,7 +200,7 @@ private:
 
 /// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), no longer does; true for NaN.
 template <class T>
-[[gnu::always_inline]] inline auto left_bin(T a)
+TESTBED_INLINE inline auto left_bin(T a)
 {
     return !(a >= T(-bin_tolerance) && a < T(1 - bin_tolerance));
 }

@@ -6,6 +6,16 @@
 #include <cstddef>
 #include <experimental/simd>
 
+/// What a kernel consists of is inlined into it whole: one call left makes the compiler spill every vector register around it. Not
+/// under the address sanitizer, with which that takes minutes to compile.
+#ifdef __SANITIZE_ADDRESS__
+#define TESTBED_INLINE
+#define TESTBED_FLATTEN
+#else
+#define TESTBED_INLINE __attribute__((always_inline))
+#define TESTBED_FLATTEN __attribute__((flatten))
+#endif
+
 namespace testbed
 {
 namespace stdx = std::experimental;
@@ -47,7 +57,7 @@ private:
 
 /// Sets packs to zero one by one: a value-initialised array of them becomes a string instruction, which costs more than the sums.
 template <std::size_t N>
-[[gnu::always_inline]] inline void set_zero(std::array<Pack, N>& packs)
+TESTBED_INLINE inline void set_zero(std::array<Pack, N>& packs)
 {
     for (Pack& pack : packs)
         pack = Pack(0.0);
@@ -55,7 +65,7 @@ template <std::size_t N>
 
 /// Calls kernel(offset, lanes) for the points [begin, end).
 template <class Kernel>
-[[gnu::always_inline]] inline void for_each_pack(std::size_t begin, std::size_t end, Kernel&& kernel)
+TESTBED_INLINE inline void for_each_pack(std::size_t begin, std::size_t end, Kernel&& kernel)
 {
     std::size_t p = begin;
     for (; p + pack_size <= end; p += pack_size)
@@ -64,38 +74,38 @@ template <class Kernel>
         kernel(p, SomeLanes(end - p));
 }
 
-[[gnu::always_inline]] inline double sum(Pack v)
+TESTBED_INLINE inline double sum(Pack v)
 {
     return stdx::reduce(v);
 }
-[[gnu::always_inline]] inline double sum(double v)
+TESTBED_INLINE inline double sum(double v)
 {
     return v;
 }
-[[gnu::always_inline]] inline Pack max(Pack a, Pack b)
+TESTBED_INLINE inline Pack max(Pack a, Pack b)
 {
     return stdx::max(a, b);
 }
-[[gnu::always_inline]] inline Pack min(Pack a, Pack b)
+TESTBED_INLINE inline Pack min(Pack a, Pack b)
 {
     return stdx::min(a, b);
 }
-[[gnu::always_inline]] inline double max(double a, double b)
+TESTBED_INLINE inline double max(double a, double b)
 {
     return a > b ? a : b;
 }
-[[gnu::always_inline]] inline double min(double a, double b)
+TESTBED_INLINE inline double min(double a, double b)
 {
     return a < b ? a : b;
 }
 
 /// v where it is larger than the threshold, else zero.
-[[gnu::always_inline]] inline Pack above(Pack v, double threshold)
+TESTBED_INLINE inline Pack above(Pack v, double threshold)
 {
     stdx::where(v <= Pack(threshold), v) = Pack(0.0);
     return v;
 }
-[[gnu::always_inline]] inline double above(double v, double threshold)
+TESTBED_INLINE inline double above(double v, double threshold)
 {
     return v > threshold ? v : 0.0;
 }

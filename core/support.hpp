@@ -16,7 +16,7 @@ struct PointSupport
     static constexpr double half_width = 0;
 
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> weights(T, T)
+    TESTBED_INLINE static std::array<T, S> weights(T, T)
     {
         return {T(1.0)};
     }
@@ -29,12 +29,12 @@ struct DomainSupport
     static constexpr bool has_box = true;
 
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> weights(T a, T width)
+    TESTBED_INLINE static std::array<T, S> weights(T a, T width)
     {
         return weights_by(a, width, T(1.0) / width);
     }
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> weights_by(T a, T width, T inverse)
+    TESTBED_INLINE static std::array<T, S> weights_by(T a, T width, T inverse)
     {
         const T high = above(a + width - T(1.0), bin_tolerance) * inverse;
         return {T(1.0) - high, high};
@@ -53,7 +53,7 @@ struct Weights
 {
     std::array<Pack, Support::S> x, y;
 
-    [[gnu::always_inline]] explicit Weights(const Corner& c)
+    TESTBED_INLINE explicit Weights(const Corner& c)
     {
         if constexpr (std::is_same_v<Support, DomainSupport>)
         {
@@ -82,7 +82,7 @@ struct BinFrame
     }
 
     template <class Support, class Lanes>
-    [[gnu::always_inline]] Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
     {
         const Pack cx = x * Pack(scale) - Pack(x0), cy = y * Pack(scale) - Pack(y0);
         if constexpr (!Support::has_box)
@@ -95,14 +95,14 @@ struct BinFrame
         }
     }
     template <class Support, class Lanes>
-    [[gnu::always_inline]] Corner corner(const Points& q, std::size_t p, const Lanes& lanes) const
+    TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes) const
     {
         return corner<Support>(q, p, lanes, lanes.load(&q.x[p]), lanes.load(&q.y[p]));
     }
     /// Whether the support of one of the points, at c, begins in another bin, or one of them is turned inside out; the volume must
     /// be up to date.
     template <class Support, class Lanes>
-    [[gnu::always_inline]] bool left(const Points& q, std::size_t p, const Lanes& lanes, const Corner& c) const
+    TESTBED_INLINE bool left(const Points& q, std::size_t p, const Lanes& lanes, const Corner& c) const
     {
         auto out = left_bin(c.ax) || left_bin(c.ay);
         if constexpr (Support::has_box)
@@ -115,7 +115,7 @@ struct BinFrame
 
 /// Volume of a pack of points [m^2].
 template <class Support, class Lanes>
-[[gnu::always_inline]] inline Pack volume(const Points& q, std::size_t p, const Lanes& lanes)
+TESTBED_INLINE inline Pack volume(const Points& q, std::size_t p, const Lanes& lanes)
 {
     if constexpr (Support::has_box)
         return Pack(4.0) * lanes.load(&q.half_x[p]) * lanes.load(&q.half_y[p]);
@@ -125,7 +125,7 @@ template <class Support, class Lanes>
 
 /// Volume, or box, of a pack of points after the displacement gradient increment d.
 template <class Support, class Lanes>
-[[gnu::always_inline]] inline void stretch(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d)
+TESTBED_INLINE inline void stretch(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d)
 {
     const Pack one(1.0);
     if constexpr (Support::has_box)

@@ -16,11 +16,11 @@ public:
     static constexpr int S = Support::S;
     static constexpr std::size_t quantities = 4, numbers = S * S * quantities;
 
-    [[gnu::always_inline]] CellSums(const Lattice&, const Bin&) { set_zero(total_); }
+    TESTBED_INLINE CellSums(const Lattice&, const Bin&) { set_zero(total_); }
 
     /// Points [p, p + lanes) of the body, with their support at c.
     template <class Lanes>
-    [[gnu::always_inline]] void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner& c)
+    TESTBED_INLINE void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner& c)
     {
         const Points& q = body.points;
         const Weights<Support> weights(c);
@@ -46,7 +46,7 @@ public:
                 }
             }
     }
-    [[gnu::always_inline]] void write(const Body& body, const Bin& bin, double* to) const
+    TESTBED_INLINE void write(const Body& body, const Bin& bin, double* to) const
     {
         for (std::size_t k = 0; k < S * S; ++k, to += quantities)
         {
@@ -145,7 +145,7 @@ struct BinMotion
     std::array<Gradient<>, S * S> cell;
     std::array<double, (S + 1) * (S + 1)> ux, uy;
 
-    [[gnu::always_inline]] BinMotion(const LpfdmGrid& grid, const Bin& bin, double dt)
+    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin, double dt)
     {
         for (int j = 0; j < S; ++j)
             for (int i = 0; i < S; ++i)
@@ -158,7 +158,7 @@ struct BinMotion
                 uy[j * (S + 1) + i] = grid.nodes.vy[n] * dt;
             }
     }
-    [[gnu::always_inline]] Gradient<Pack> gradient(const Corner& c) const
+    TESTBED_INLINE Gradient<Pack> gradient(const Corner& c) const
     {
         const Weights<Support> weights(c);
         Gradient<Pack> d{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
@@ -171,7 +171,7 @@ struct BinMotion
             }
         return d;
     }
-    [[gnu::always_inline]] void displace(const Corner& c, Pack& x, Pack& y) const
+    TESTBED_INLINE void displace(const Corner& c, Pack& x, Pack& y) const
     {
         const auto wx = hat(c.ax + Pack(0.5) * c.wx), wy = hat(c.ay + Pack(0.5) * c.wy);
         for (int j = 0; j <= S; ++j)
@@ -187,7 +187,7 @@ struct BinMotion
         }
     }
     /// Bilinear weights of the nodes 0..S at xi in [0, S).
-    [[gnu::always_inline]] static std::array<Pack, S + 1> hat(Pack xi)
+    TESTBED_INLINE static std::array<Pack, S + 1> hat(Pack xi)
     {
         if constexpr (S == 1)
             return {Pack(1.0) - xi, xi};
@@ -209,30 +209,32 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, d
     Bins& sorted = body.bins;
     const auto& bins = sorted.list();
     std::atomic<bool> moved{false};
-    parallel_for(
-        bins.size(), [&](std::size_t b) __attribute__((flatten)) {
-            const BinFrame frame(grid.lattice, bins[b]);
-            const BinMotion<Support> motion(grid, bins[b], dt);
-            bool left = false;
-            for_each_pack(
-                bins[b].begin, bins[b].end, [&](std::size_t p, const auto& lanes) __attribute__((always_inline)) {
-                    Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
-                    const Corner c = frame.corner<Support>(q, p, lanes, x, y);
-                    const Gradient<Pack> d = motion.gradient(c);
-                    motion.displace(c, x, y);
-                    law.update(q, p, lanes, d);
-                    stretch<Support>(q, p, lanes, d);
-                    lanes.store(&q.x[p], x);
-                    lanes.store(&q.y[p], y);
-                    left |= frame.left<Support>(q, p, lanes, frame.corner<Support>(q, p, lanes, x, y));
-                });
-            sum_bin<Support, CellSums<Support>>(grid.lattice, body, bins[b], sums + b * CellSums<Support>::numbers);
-            if (left)
-            {
-                sorted.mark(b);
-                moved.store(true, std::memory_order_relaxed);
-            }
-        });
+    parallel_for(bins.size(),
+                 [&](std::size_t b) TESTBED_FLATTEN
+                 {
+                     const BinFrame frame(grid.lattice, bins[b]);
+                     const BinMotion<Support> motion(grid, bins[b], dt);
+                     bool left = false;
+                     for_each_pack(bins[b].begin, bins[b].end,
+                                   [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                                   {
+                                       Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
+                                       const Corner c = frame.corner<Support>(q, p, lanes, x, y);
+                                       const Gradient<Pack> d = motion.gradient(c);
+                                       motion.displace(c, x, y);
+                                       law.update(q, p, lanes, d);
+                                       stretch<Support>(q, p, lanes, d);
+                                       lanes.store(&q.x[p], x);
+                                       lanes.store(&q.y[p], y);
+                                       left |= frame.left<Support>(q, p, lanes, frame.corner<Support>(q, p, lanes, x, y));
+                                   });
+                     sum_bin<Support, CellSums<Support>>(grid.lattice, body, bins[b], sums + b * CellSums<Support>::numbers);
+                     if (left)
+                     {
+                         sorted.mark(b);
+                         moved.store(true, std::memory_order_relaxed);
+                     }
+                 });
     return moved;
 }
 }  // namespace testbed

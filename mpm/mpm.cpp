@@ -302,26 +302,29 @@ private:
     {
         using Momentum = NodeSums<Shape, Strain, Scatter::momentum>;
         const Pack flip(options_.flip), pic(1 - options_.flip);
-        for_each_bin([&](Body & body, const auto&, const Bin& bin, std::size_t number, const BinFrame& frame) __attribute__((flatten)) {
-            Points& q = body.points;
-            const NodalVelocity<S> increment(lattice_, bin, nodes_.fx, nodes_.fy), total(lattice_, bin, nodes_.vx, nodes_.vy);
-            for_each_pack(
-                bin.begin, bin.end, [&](std::size_t p, const auto& lanes) __attribute__((always_inline)) {
-                    const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                    const auto dv = increment.at(at);
-                    Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
-                    if constexpr (with_pic)
-                    {
-                        const auto v = total.at(at);
-                        vx = flip * vx + pic * v[0];
-                        vy = flip * vy + pic * v[1];
-                    }
-                    lanes.store(&q.vx[p], vx);
-                    lanes.store(&q.vy[p], vy);
-                });
-            if constexpr (with_remap)
-                sum_bin<Shape, Momentum>(lattice_, body, bin, &workspace_[number * Momentum::numbers]);
-        });
+        for_each_bin(
+            [&](Body& body, const auto&, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+            {
+                Points& q = body.points;
+                const NodalVelocity<S> increment(lattice_, bin, nodes_.fx, nodes_.fy), total(lattice_, bin, nodes_.vx, nodes_.vy);
+                for_each_pack(bin.begin, bin.end,
+                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                              {
+                                  const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
+                                  const auto dv = increment.at(at);
+                                  Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
+                                  if constexpr (with_pic)
+                                  {
+                                      const auto v = total.at(at);
+                                      vx = flip * vx + pic * v[0];
+                                      vy = flip * vy + pic * v[1];
+                                  }
+                                  lanes.store(&q.vx[p], vx);
+                                  lanes.store(&q.vy[p], vy);
+                              });
+                if constexpr (with_remap)
+                    sum_bin<Shape, Momentum>(lattice_, body, bin, &workspace_[number * Momentum::numbers]);
+            });
     }
 
     /// Stress alone, with the nodal velocity (USF).
@@ -348,34 +351,37 @@ private:
     void move_points(const std::vector<double>& carrier_x, const std::vector<double>& carrier_y, double dt)
     {
         std::atomic<bool> moved{false};
-        for_each_bin([&](Body & body, const auto& law, const Bin& bin, std::size_t number, const BinFrame& frame) __attribute__((flatten)) {
-            Points& q = body.points;
-            const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
-            const NodalVelocity<S> carrier(lattice_, bin, carrier_x, carrier_y), v(lattice_, bin, nodes_.vx, nodes_.vy);
-            bool left = false;
-            for_each_pack(
-                bin.begin, bin.end, [&](std::size_t p, const auto& lanes) __attribute__((always_inline)) {
-                    const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                    const Gradient<Pack> d = v.template gradient<Strain>(at, strain, dt);
-                    if constexpr (with_stress)
-                        law.update(q, p, lanes, d);
-                    stretch<Shape>(q, p, lanes, d);
-                    const auto step = carrier.at(at);
-                    const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
-                    lanes.store(&q.x[p], x);
-                    lanes.store(&q.y[p], y);
-                    left |= frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x, y));
-                    if constexpr (reaches_beyond)
-                        left |= lanes.any(outside(x, y));
-                });
-            if constexpr (with_stress)
-                sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number));
-            if (left)
+        for_each_bin(
+            [&](Body& body, const auto& law, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
             {
-                body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
-                moved.store(true, std::memory_order_relaxed);
-            }
-        });
+                Points& q = body.points;
+                const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
+                const NodalVelocity<S> carrier(lattice_, bin, carrier_x, carrier_y), v(lattice_, bin, nodes_.vx, nodes_.vy);
+                bool left = false;
+                for_each_pack(bin.begin, bin.end,
+                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                              {
+                                  const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
+                                  const Gradient<Pack> d = v.template gradient<Strain>(at, strain, dt);
+                                  if constexpr (with_stress)
+                                      law.update(q, p, lanes, d);
+                                  stretch<Shape>(q, p, lanes, d);
+                                  const auto step = carrier.at(at);
+                                  const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
+                                  lanes.store(&q.x[p], x);
+                                  lanes.store(&q.y[p], y);
+                                  left |= frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x, y));
+                                  if constexpr (reaches_beyond)
+                                      left |= lanes.any(outside(x, y));
+                              });
+                if constexpr (with_stress)
+                    sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number));
+                if (left)
+                {
+                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
+                    moved.store(true, std::memory_order_relaxed);
+                }
+            });
         moved_ = moved;
     }
     /// Whether points left the lattice: with shapes that begin half a cell from the point they do so in the middle of a bin.

@@ -14,12 +14,12 @@ struct LinearShape
     static constexpr double half_width = 0;
 
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> weights(T a, T)
+    TESTBED_INLINE static std::array<T, S> weights(T a, T)
     {
         return {T(1.0) - a, a};
     }
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> slopes(T, T)
+    TESTBED_INLINE static std::array<T, S> slopes(T, T)
     {
         return {T(-1.0), T(1.0)};
     }
@@ -33,14 +33,14 @@ struct GimpShape
     static constexpr bool has_box = true;
 
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> weights(T a, T width)
+    TESTBED_INLINE static std::array<T, S> weights(T a, T width)
     {
         const T second = above(a + width - T(1.0), bin_tolerance), first = width - second;
         const T low = first * (T(1.0) - a - T(0.5) * first) / width, high = T(0.5) * second * second / width;
         return {low, T(1.0) - low - high, high};
     }
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> slopes(T a, T width)
+    TESTBED_INLINE static std::array<T, S> slopes(T a, T width)
     {
         const T second = above(a + width - T(1.0), bin_tolerance) / width, first = T(1.0) - second;
         return {-first, first - second, second};
@@ -56,13 +56,13 @@ struct BSplineShape
     static constexpr double half_width = 0.5;
 
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> weights(T a, T)
+    TESTBED_INLINE static std::array<T, S> weights(T a, T)
     {
         const T low = T(0.5) * (T(1.0) - a) * (T(1.0) - a), high = T(0.5) * a * a;
         return {low, T(1.0) - low - high, high};
     }
     template <class T>
-    [[gnu::always_inline]] static std::array<T, S> slopes(T a, T)
+    TESTBED_INLINE static std::array<T, S> slopes(T a, T)
     {
         return {a - T(1.0), T(1.0) - T(2.0) * a, a};
     }

@@ -17,7 +17,7 @@ struct ShapeAt
     static constexpr int S = Shape::S;
     std::array<Pack, S> wx, wy, gx, gy;
 
-    [[gnu::always_inline]] ShapeAt(const Corner& c, double scale)
+    TESTBED_INLINE ShapeAt(const Corner& c, double scale)
         : wx(Shape::weights(c.ax, c.wx)),
           wy(Shape::weights(c.ay, c.wy)),
           gx(Shape::slopes(c.ax, c.wx)),
@@ -57,7 +57,7 @@ public:
     {
         std::array<double, 4> x, y;  ///< 1/m
     };
-    [[gnu::always_inline]] void add(Pack v, Pack ax, Pack ay)
+    TESTBED_INLINE void add(Pack v, Pack ax, Pack ay)
     {
         volume_ += v;
         ax_ += v * ax;
@@ -134,11 +134,11 @@ public:
     static constexpr int S = Shape::S;
     static constexpr std::size_t Q = sums_of<what>, numbers = static_cast<std::size_t>(S * S) * Q;
 
-    [[gnu::always_inline]] NodeSums(const Lattice& lattice, const Bin&) : scale_(1 / lattice.cell_size) { set_zero(total_); }
+    TESTBED_INLINE NodeSums(const Lattice& lattice, const Bin&) : scale_(1 / lattice.cell_size) { set_zero(total_); }
 
     /// Points [p, p + lanes) of the body, with their support at c.
     template <class Lanes>
-    [[gnu::always_inline]] void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner& c)
+    TESTBED_INLINE void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner& c)
     {
         const ShapeAt<Shape> at(c, scale_);
         const Points& q = body.points;
@@ -183,7 +183,7 @@ public:
                 }
             }
     }
-    [[gnu::always_inline]] void write(const Body&, const Bin&, double* to) const
+    TESTBED_INLINE void write(const Body&, const Bin&, double* to) const
     {
         for (std::size_t k = 0; k < numbers; ++k)
             to[k] = sum(total_[k]);
@@ -222,8 +222,7 @@ struct NodalVelocity
 {
     std::array<double, static_cast<std::size_t>(S*S)> x, y;
 
-    [[gnu::always_inline]] NodalVelocity(const Lattice& lattice, const Bin& bin, const std::vector<double>& vx,
-                                         const std::vector<double>& vy)
+    TESTBED_INLINE NodalVelocity(const Lattice& lattice, const Bin& bin, const std::vector<double>& vx, const std::vector<double>& vy)
     {
         for (int j = 0; j < S; ++j)
             for (int i = 0; i < S; ++i)
@@ -234,7 +233,7 @@ struct NodalVelocity
             }
     }
     template <class At>
-    [[gnu::always_inline]] std::array<Pack, 2> at(const At& at) const
+    TESTBED_INLINE std::array<Pack, 2> at(const At& at) const
     {
         Pack vx(0.0), vy(0.0);
         for (int j = 0; j < S; ++j)
@@ -248,7 +247,7 @@ struct NodalVelocity
     }
     /// Gradient of the increment over dt, with the dilatation that `strain` prescribes.
     template <class Strain, class At, class InBin>
-    [[gnu::always_inline]] Gradient<Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
+    TESTBED_INLINE Gradient<Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
     {
         Gradient<Pack> d{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
         [[maybe_unused]] Pack dilatation(0.0);

@@ -49,7 +49,7 @@ inline double elastic_energy_density(const ElasticModuli& m, const SymTensor<>& 
 struct NoRotation
 {
     template <class T>
-    [[gnu::always_inline]] static void rotate(SymTensor<T>&, T)
+    TESTBED_INLINE static void rotate(SymTensor<T>&, T)
     {
     }
 };
@@ -58,7 +58,7 @@ struct NoRotation
 struct JaumannRotation
 {
     template <class T>
-    [[gnu::always_inline]] static void rotate(SymTensor<T>& s, T angle)
+    TESTBED_INLINE static void rotate(SymTensor<T>& s, T angle)
     {
         const T dxx = T(-2.0) * angle * s.xy, dxy = angle * (s.xx - s.yy);
         s.xx += dxx;
@@ -71,7 +71,7 @@ struct JaumannRotation
 struct ExactRotation
 {
     template <class T>
-    [[gnu::always_inline]] static void rotate(SymTensor<T>& s, T angle)
+    TESTBED_INLINE static void rotate(SymTensor<T>& s, T angle)
     {
         const T square = angle * angle;
         const T t = angle * (T(0.5) + square * (T(1.0 / 24) + square * T(1.0 / 240)));  // tan(angle / 2)
@@ -102,13 +102,13 @@ struct Hypoelastic
 
     /// The pure point function: stress after the displacement gradient increment d.
     template <class T>
-    [[gnu::always_inline]] void update(State<T>& state, const Gradient<T>& d) const
+    TESTBED_INLINE void update(State<T>& state, const Gradient<T>& d) const
     {
         update(state, d, T(1.0));
     }
 
     template <class T>
-    [[gnu::always_inline]] void update(State<T>& state, const Gradient<T>& d, T stiffness) const
+    TESTBED_INLINE void update(State<T>& state, const Gradient<T>& d, T stiffness) const
     {
         SymTensor<T>& s = state.stress;
         Rotation::rotate(s, d.rotation());
@@ -120,7 +120,7 @@ struct Hypoelastic
 
     /// The same on the points [p, p + lanes).
     template <class Lanes>
-    [[gnu::always_inline]] void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
     {
         State<Pack> state = load(q, p, lanes);
         update(state, d);
@@ -151,7 +151,7 @@ struct VaryingStiffness : Law
     void allocate(Points& q) const { q.stiffness.activate(q.count); }
 
     template <class Lanes>
-    [[gnu::always_inline]] void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
     {
         auto state = Law::load(q, p, lanes);
         Law::update(state, d, lanes.load(&q.stiffness[p]));
