@@ -87,7 +87,10 @@ Measurement measure(const std::string& method, const std::string& law, double po
     const std::string scene_path = std::string(BENCHMARKS) + (law == "elastic" ? "/speed/scene.toml" : "/cliff/scene.toml");
     const Scene scene = load_scene(scene_path, method, settings(law, points)).scene;
     const std::unique_ptr<Solver> solver = make_solver(scene);
-    Measurement m{method, law, team};
+    Measurement m;
+    m.method = method;
+    m.law = law;
+    m.team = team;
     m.setup = setup.seconds();
     const double dt = time_step(scene);
     std::size_t step = 0;
