@@ -111,10 +111,8 @@ def work_precision(study, entry, style):
         if not costs:
             continue
         several = len({c.L for c in costs}) < len(costs)
-        least = {}
-        for at, value in of[label]:
-            least[at] = min(value, least.get(at, math.inf))
-        line = front(of[label]) if several and y == "error" else sorted(least.items()) if several else sorted(of[label])
+        fastest = [min((c for c in costs if c.L == size), key=lambda c: c.solve_s) for size in {c.L for c in costs}]
+        line = front(of[label]) if several and y == "error" else sorted((getattr(c, x), getattr(c, y)) for c in fastest)
         if several:
             axis.plot(*zip(*of[label]), **{**look, "linestyle": "none", "markersize": 2.5, "alpha": 0.45})
         axis.plot(*zip(*line), **look)
