@@ -124,36 +124,51 @@ def _sample(field, x, band, spacing, others):
     return s[use], d, np.clip(strain[use] - background[:, None], 0.0, None), clear
 
 
-def _trace(field, x, band, spacing, others):
-    """The band with its axis through the centroids of its normals, and its width and strength; None when it has no normals."""
+def _measure(field, x, band, spacing, others):
+    """The band with the normals, the width and the strength that its axis has; None when it has too few normals; and where they stand (S,) [m]."""
+    s, d, excess, clear = _sample(field, x, band, spacing, others)
+    total, top = excess.sum(axis=1), excess.max(axis=1)
+    good = (total > 0) & (top > 0.3 * np.median(top)) if len(top) else np.zeros(0, bool)
+    if good.sum() < FEWEST:
+        return None, s
+    width = half_max_width(d, np.median(excess[good], axis=0))
+    strength = float(excess[:, np.abs(d) <= 0.5 * spacing].mean())
+    return replace(band, width=width, strength=strength, clear=clear, d=d, normals=excess[good]), s[good]
+
+
+def _turn(field, x, band, spacing, others):
+    """The band with its axis through the centroids of its normals; None where it loses its clear normals."""
     for _ in range(5):
-        s, d, excess, clear = _sample(field, x, band, spacing, others)
-        total, top = excess.sum(axis=1), excess.max(axis=1)
-        good = (total > 0) & (top > 0.3 * np.median(top)) if len(top) else np.zeros(0, bool)
-        if good.sum() < FEWEST:
+        found, s = _measure(field, x, band, spacing, others)
+        if found is None or not found.clear:
             return None
-        slope, shift, *_ = theilslopes(excess[good] @ d / total[good], s[good])
+        slope, shift, *_ = theilslopes(found.normals @ found.d / found.normals.sum(axis=1), s)
         axis = band.tangent + slope * band.normal
-        angle = math.atan2(axis[1], axis[0])
-        turned = Band(angle, 0.0, 0.0)
-        width = half_max_width(d, np.median(excess[good], axis=0))
-        band = Band(angle, float(((band.offset + shift) * band.normal) @ turned.normal), max(REACH * width, 3.0 * spacing), width)
-    band.d, band.normals, band.clear = d, excess[good], clear
-    band.strength = float(excess[:, np.abs(d) <= 0.5 * spacing].mean())
-    return band
+        turned = Band(math.atan2(axis[1], axis[0]), 0.0, max(REACH * found.width, 3.0 * spacing), found.width)
+        band = replace(turned, offset=float(((band.offset + shift) * band.normal) @ turned.normal))
+    return _measure(field, x, band, spacing, others)[0]
 
 
 def _trace_all(field, x, bands, spacing):
     """The bands traced where the others do not disturb, twice, from normals of several lengths, of which those count on whose axis the
-    strain stands out most. Bands that have no normals are left out."""
+    strain stands out most. A band without clear normals keeps the axis that was sought; one without normals is left out."""
     for _ in range(2):
         traced = []
         for band in bands:
             others = [b for b in bands if b is not band]
-            tries = (_trace(field, x, replace(band, half=shorter * band.half), spacing, others) for shorter in SHORTER)
-            traced.append(max((b for b in tries if b is not None), key=lambda b: b.strength, default=None))
+            starts = [replace(band, half=shorter * band.half) for shorter in SHORTER]
+            found = [b for b in (_turn(field, x, start, spacing, others) for start in starts) if b is not None]
+            found = found or [b for b, _ in (_measure(field, x, start, spacing, others) for start in starts) if b is not None]
+            traced.append(max(found, key=lambda b: b.strength, default=None))
         bands = [band for band in traced if band is not None]
     return bands
+
+
+def _remains(field, x, band, spacing, other, least):
+    """Whether a band without clear normals still exceeds `least` after the mean normal of the other one is taken out of the strain."""
+    profile = other.normals.mean(axis=0)
+    rest, _ = _measure(lambda at: field(at) - np.interp(other.distance(at), other.d, profile, 0.0, 0.0), x, band, spacing, [other])
+    return rest is not None and rest.strength > least
 
 
 def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
@@ -172,11 +187,10 @@ def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
     if most == 1:
         return strong([first])
     conjugate = strong([first, _search(x, strain, volume, spacing, range(-89, 0) if first.angle > 0 else range(1, 90))])
-    free = np.abs(first.distance(x)) > 1.5 * first.width
-    if len(conjugate) == 2 and all(band.clear for band in conjugate) or free.sum() < 10:
+    if len(conjugate) == 2 and (conjugate[1].clear or _remains(field, x, conjugate[1], spacing, conjugate[0], least)):
         return conjugate
-    apart = strong([first, _search(x[free], strain[free], volume[free], spacing)])
-    return max(apart, conjugate, key=len) if not all(band.clear for band in apart) else apart
+    free = np.abs(first.distance(x)) > 1.5 * first.width
+    return strong([first, _search(x[free], strain[free], volume[free], spacing)] if free.sum() >= 10 else [first])
 
 
 def widths(band):

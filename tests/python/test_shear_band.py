@@ -62,6 +62,16 @@ def test_crossing_bands_do_not_disturb_each_other(shape, width, degrees):
         assert [widths(band)[name] / width for name in ESTIMATORS] == pytest.approx(FACTORS[shape], rel=0.09)
 
 
+@pytest.mark.parametrize("shape, width", [("uniform", 0.35), ("cosine", 0.7), ("triangle", 0.7)])  # 0.35 at half maximum
+def test_wide_bands_in_a_small_body_have_no_clear_normals_but_count(shape, width):
+    strong, weak = (shape, width, 45.0, 0.3, (0.5, 1.35)), (shape, width, -45.0, 0.25, (0.5, 1.35))
+    first, second = find(0.025, [strong, weak])
+    assert not second.clear
+    assert sorted([first.angle, second.angle]) == pytest.approx(np.radians([-45.0, 45.0]), abs=0.1)
+    one, = find(0.025, [strong])
+    assert one.inclination == pytest.approx(45.0, abs=3.0)
+
+
 def test_bands_that_do_not_cross():
     bands = find(0.0125, [("cosine", 0.15, 50.0, 0.3, (0.5, 0.6)), ("cosine", 0.15, 50.0, 0.2, (0.5, 1.4))])
     assert [band.inclination for band in bands] == pytest.approx([50.0, 50.0], abs=0.2)
