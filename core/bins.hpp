@@ -198,10 +198,10 @@ private:
     std::size_t size_before_ = 0;
 };
 
-/// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), no longer does; true for NaN.
+/// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), still does; false for NaN.
 template <class T>
-TESTBED_INLINE inline auto left_bin(T a)
+TESTBED_INLINE inline auto is_in_bin(T a)
 {
-    return !(a >= T(-bin_tolerance) && a < T(1 - bin_tolerance));
+    return a >= T(-bin_tolerance) && a < T(1 - bin_tolerance);
 }
 }  // namespace testbed

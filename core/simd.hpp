@@ -2,9 +2,13 @@
 /// Packs of points. A kernel is written once as a function of (offset, lanes) and is called for whole packs and for
 /// the rest of a bin, where lanes masks what lies behind its end.
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
+#include <cstring>
 #include <experimental/simd>
+#include <utility>
 
 /// What a kernel consists of is inlined into it whole: one call left makes the compiler spill every vector register around it. Not
 /// under the address sanitizer, with which that takes minutes to compile.
@@ -55,12 +59,16 @@ private:
     Pack::mask_type mask_;
 };
 
-/// Sets packs to zero one by one: a value-initialised array of them becomes a string instruction, which costs more than the sums.
+/// Sets packs to zero one by one: a value-initialised array of them, or a loop over it, becomes a string instruction, which costs more
+/// than the sums.
 template <std::size_t N>
 TESTBED_INLINE inline void set_zero(std::array<Pack, N>& packs)
 {
-    for (Pack& pack : packs)
-        pack = Pack(0.0);
+    [&]<std::size_t... k>(std::index_sequence<k...>)
+    {
+        ((packs[k] = Pack(0.0)), ...);
+    }
+    (std::make_index_sequence<N>{});
 }
 
 /// Calls kernel(offset, lanes) for the points [begin, end).
@@ -82,6 +90,44 @@ TESTBED_INLINE inline double sum(double v)
 {
     return v;
 }
+
+namespace lanes
+{
+using Vector [[gnu::vector_size(sizeof(Pack))]] = double;
+constexpr std::size_t W = pack_size;
+
+/// Neighbours added: single lanes, those of y put beside those of x, or pairs of lanes, those of y behind those of x.
+template <bool zip, std::size_t... k>
+TESTBED_INLINE inline Vector fold(Vector x, Vector y, std::index_sequence<k...>)
+{
+    if constexpr (zip)
+        return __builtin_shufflevector(x, y, (k % 2 == 0 ? k : W + k - 1)...) +
+               __builtin_shufflevector(x, y, (k % 2 == 0 ? k + 1 : W + k)...);
+    else
+        return __builtin_shufflevector(x, y, (k / 2 * 4 + k % 2)...) + __builtin_shufflevector(x, y, (k / 2 * 4 + 2 + k % 2)...);
+}
+/// The sums of packs [first, first + count) by the lanes that they come to; count is a power of two, packs from N on are zero.
+template <std::size_t first, std::size_t count, std::size_t N>
+TESTBED_INLINE inline Vector sum(const std::array<Pack, N>& packs)
+{
+    if constexpr (first >= N)
+        return Vector{};
+    else if constexpr (count == 1)
+        return std::bit_cast<Vector>(packs[first]);
+    else
+        return fold<count == 2>(sum<first, count / 2>(packs), sum<first + count / 2, count / 2>(packs), std::make_index_sequence<W>{});
+}
+}  // namespace lanes
+
+/// The sums of N packs, to[0..N). Folded together: a fraction of the instructions of N sums.
+template <std::size_t first = 0, std::size_t N>
+TESTBED_INLINE inline void sum(const std::array<Pack, N>& packs, double* to)
+{
+    const lanes::Vector sums = lanes::sum<first, pack_size>(packs);
+    std::memcpy(to + first, &sums, std::min(pack_size, N - first) * sizeof(double));
+    if constexpr (first + pack_size < N)
+        sum<first + pack_size>(packs, to);
+}
 TESTBED_INLINE inline Pack max(Pack a, Pack b)
 {
     return stdx::max(a, b);
@@ -97,6 +143,12 @@ TESTBED_INLINE inline double max(double a, double b)
 TESTBED_INLINE inline double min(double a, double b)
 {
     return a < b ? a : b;
+}
+
+TESTBED_INLINE inline Pack select(Pack::mask_type mask, Pack a, Pack b)
+{
+    stdx::where(mask, b) = a;
+    return b;
 }
 
 /// v where it is larger than the threshold, else zero.

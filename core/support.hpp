@@ -104,12 +104,11 @@ struct BinFrame
     template <class Support, class Lanes>
     TESTBED_INLINE bool left(const Points& q, std::size_t p, const Lanes& lanes, const Corner& c) const
     {
-        auto out = left_bin(c.ax) || left_bin(c.ay);
+        const auto in = is_in_bin(c.ax) && is_in_bin(c.ay);
         if constexpr (Support::has_box)
-            out = out || !(lanes.load(&q.half_x[p]) > Pack(0.0)) || !(lanes.load(&q.half_y[p]) > Pack(0.0));
+            return lanes.any(!(in && lanes.load(&q.half_x[p]) > Pack(0.0) && lanes.load(&q.half_y[p]) > Pack(0.0)));
         else
-            out = out || !(lanes.load(&q.volume[p]) > Pack(0.0));
-        return lanes.any(out);
+            return lanes.any(!(in && lanes.load(&q.volume[p]) > Pack(0.0)));
     }
 };
 
@@ -164,8 +163,7 @@ void spread(const Lattice& lattice, const Body& body, std::size_t first_bin, std
                                            }
                                    });
                      double* to = &partial[(first_bin + b) * S * S * Q];
-                     for (std::size_t k = 0; k < total.size(); ++k)
-                         to[k] = sum(total[k]);
+                     sum(total, to);
                  });
 }
 

@@ -46,14 +46,14 @@ public:
                 }
             }
     }
-    TESTBED_INLINE void write(const Body& body, const Bin& bin, double* to) const
+    TESTBED_INLINE void write(const Body& body, const Bin& bin, double* to)
     {
-        for (std::size_t k = 0; k < S * S; ++k, to += quantities)
-        {
-            to[0] = body.points.mass * (S == 1 ? static_cast<double>(bin.end - bin.begin) : sum(total_[k * quantities]));
-            for (std::size_t n = 1; n < quantities; ++n)
-                to[n] = sum(total_[k * quantities + n]);
-        }
+        if constexpr (S > 1)
+            for (std::size_t k = 0; k < S * S; ++k)
+                total_[k * quantities] *= Pack(body.points.mass);
+        sum(total_, to);
+        if constexpr (S == 1)
+            to[0] = body.points.mass * static_cast<double>(bin.end - bin.begin);
     }
 
 private:
@@ -137,50 +137,60 @@ inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& 
         });
 }
 
-/// What is constant in a bin: the gradients of its S x S cells and the increments of its (S+1) x (S+1) nodes.
+/// What is constant in a bin: the gradient of the increment in its S x S cells, and the velocity of its (S+1) x (S+1) nodes.
 template <class Support>
 struct BinMotion
 {
     static constexpr int S = Support::S;
-    std::array<Gradient<>, S * S> cell;
-    std::array<double, (S + 1) * (S + 1)> ux, uy;
+    std::array<Gradient<>, S * S> mean;  ///< over a box: coefficients of 1, a, b and a b, where a and b are its shares in the next cells
+    std::array<double, (S + 1) * (S + 1)> vx, vy;
 
-    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin, double dt)
+    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin)
     {
-        for (int j = 0; j < S; ++j)
-            for (int i = 0; i < S; ++i)
-                cell[j * S + i] = grid.cells.gradient(grid.lattice.cell(bin.i + i, bin.j + j));
+        const auto cell = [&](int i, int j) { return grid.cells.gradient(grid.lattice.cell(bin.i + i, bin.j + j)); };
+        mean[0] = cell(0, 0);
+        if constexpr (S == 2)
+        {
+            mean[1] = cell(1, 0) - cell(0, 0);
+            mean[2] = cell(0, 1) - cell(0, 0);
+            mean[3] = cell(1, 1) - cell(1, 0) - mean[2];
+        }
         for (int j = 0; j <= S; ++j)
             for (int i = 0; i <= S; ++i)
             {
                 const std::size_t n = grid.lattice.node(bin.i + i, bin.j + j);
-                ux[j * (S + 1) + i] = grid.nodes.vx[n] * dt;
-                uy[j * (S + 1) + i] = grid.nodes.vy[n] * dt;
+                vx[j * (S + 1) + i] = grid.nodes.vx[n];
+                vy[j * (S + 1) + i] = grid.nodes.vy[n];
             }
     }
     TESTBED_INLINE Gradient<Pack> gradient(const Corner& c) const
     {
-        const Weights<Support> weights(c);
-        Gradient<Pack> d{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
-        for (int j = 0; j < S; ++j)
-            for (int i = 0; i < S; ++i)
-            {
-                const Pack w = weights.x[i] * weights.y[j];
-                const Gradient<>& g = cell[j * S + i];
-                d = d + Gradient<Pack>{w * Pack(g.xx), w * Pack(g.yy), w * Pack(g.xy), w * Pack(g.yx)};
-            }
+        const auto constant = [](const Gradient<>& g) { return Gradient<Pack>{Pack(g.xx), Pack(g.yy), Pack(g.xy), Pack(g.yx)}; };
+        const auto times = [](Pack w, const Gradient<>& g) {
+            return Gradient<Pack>{w * Pack(g.xx), w * Pack(g.yy), w * Pack(g.xy), w * Pack(g.yx)};
+        };
+        Gradient<Pack> d = constant(mean[0]);
+        if constexpr (S == 2)
+        {
+            const Weights<Support> weights(c);
+            const Pack a = weights.x[1], b = weights.y[1];
+            d = d + times(a, mean[1]) + times(b, mean[2]) + times(a * b, mean[3]);
+        }
         return d;
     }
-    TESTBED_INLINE void displace(const Corner& c, Pack& x, Pack& y) const
+    TESTBED_INLINE void displace(const Corner& c, double dt, Pack& x, Pack& y) const
     {
-        const auto wx = hat(c.ax + Pack(0.5) * c.wx), wy = hat(c.ay + Pack(0.5) * c.wy);
+        const auto wx = hat(c.ax + Pack(0.5) * c.wx);
+        auto wy = hat(c.ay + Pack(0.5) * c.wy);
+        for (Pack& w : wy)
+            w *= Pack(dt);
         for (int j = 0; j <= S; ++j)
         {
             Pack rx(0.0), ry(0.0);
             for (int i = 0; i <= S; ++i)
             {
-                rx += wx[i] * Pack(ux[j * (S + 1) + i]);
-                ry += wx[i] * Pack(uy[j * (S + 1) + i]);
+                rx += wx[i] * Pack(vx[j * (S + 1) + i]);
+                ry += wx[i] * Pack(vy[j * (S + 1) + i]);
             }
             x += wy[j] * rx;
             y += wy[j] * ry;
@@ -213,7 +223,7 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, d
                  [&](std::size_t b) TESTBED_FLATTEN
                  {
                      const BinFrame frame(grid.lattice, bins[b]);
-                     const BinMotion<Support> motion(grid, bins[b], dt);
+                     const BinMotion<Support> motion(grid, bins[b]);
                      bool left = false;
                      for_each_pack(bins[b].begin, bins[b].end,
                                    [&](std::size_t p, const auto& lanes) TESTBED_INLINE
@@ -221,7 +231,7 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, d
                                        Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
                                        const Corner c = frame.corner<Support>(q, p, lanes, x, y);
                                        const Gradient<Pack> d = motion.gradient(c);
-                                       motion.displace(c, x, y);
+                                       motion.displace(c, dt, x, y);
                                        law.update(q, p, lanes, d);
                                        stretch<Support>(q, p, lanes, d);
                                        lanes.store(&q.x[p], x);

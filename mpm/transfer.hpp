@@ -185,8 +185,7 @@ public:
     }
     TESTBED_INLINE void write(const Body&, const Bin&, double* to) const
     {
-        for (std::size_t k = 0; k < numbers; ++k)
-            to[k] = sum(total_[k]);
+        sum(total_, to);
         if constexpr (Strain::averaged && what != Scatter::momentum)
         {
             const auto slopes = strain_.template slopes<Shape>(scale_);
@@ -255,7 +254,7 @@ struct NodalVelocity
             for (int i = 0; i < S; ++i)
             {
                 const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
-                const Pack vx(x[j * S + i] * dt), vy(y[j * S + i] * dt);
+                const Pack vx(x[j * S + i]), vy(y[j * S + i]);
                 d.xx += nx * vx;
                 d.yy += ny * vy;
                 d.xy += ny * vx;
@@ -269,7 +268,7 @@ struct NodalVelocity
             d.xx += correction;
             d.yy += correction;
         }
-        return d;
+        return {d.xx * Pack(dt), d.yy * Pack(dt), d.xy * Pack(dt), d.yx * Pack(dt)};
     }
 };
 }  // namespace testbed

@@ -49,9 +49,30 @@ public:
     }
     double tensile_strength() const { return tensile_strength_; }
 
-    static double yield_function(double s1, double s3, double sin_phi, double cohesion)
+    /// T is double or a pack, here and below.
+    template <class T>
+    TESTBED_INLINE static T yield_function(T s1, T s3, T sin_phi, T cohesion)
     {
-        return s1 * (1 + sin_phi) - s3 * (1 - sin_phi) - 2 * cohesion * std::sqrt(1 - sin_phi * sin_phi);
+        using std::sqrt;
+        return s1 * (T(1.0) + sin_phi) - s3 * (T(1.0) - sin_phi) - T(2.0) * cohesion * sqrt(T(1.0) - sin_phi * sin_phi);
+    }
+
+    /// Decrease of the yield function on a face per plastic multiplier.
+    template <class T>
+    TESTBED_INLINE T face_stiffness(T sin_phi) const
+    {
+        return T(4 * (moduli_.lame() * sin_psi_)) * sin_phi + T(4 * moduli_.shear()) * (T(1.0) + sin_phi * T(sin_psi_));
+    }
+
+    /// s -= multiplier D m, with the flow m = (1 + sin psi) on s[high] and -(1 - sin psi) on s[low].
+    template <class T>
+    TESTBED_INLINE void flow(std::array<T, 3>& s, std::size_t high, std::size_t low, T multiplier) const
+    {
+        const T volumetric = T(2 * moduli_.lame() * sin_psi_) * multiplier, shear = T(2 * moduli_.shear()) * multiplier;
+        for (T& si : s)
+            si -= volumetric;
+        s[high] -= shear * T(1 + sin_psi_);
+        s[low] += shear * T(1 - sin_psi_);
     }
 
     /// Returns the trial stress s in place.
@@ -96,7 +117,7 @@ private:
             return YieldRegion::elastic;
         const Principal trial = s;
         const double lame = 4 * moduli_.lame() * sin_phi * sin_psi_, shear = moduli_.shear();
-        const double same = lame + 4 * shear * (1 + sin_phi * sin_psi_);
+        const double same = face_stiffness(sin_phi);
         flow(s, 0, 2, F / same);
         if (s[0] >= s[1] && s[1] >= s[2])
             return YieldRegion::face;
@@ -113,16 +134,6 @@ private:
             return left ? YieldRegion::left_edge : YieldRegion::right_edge;
         s.fill(cohesion * std::sqrt(1 - sin_phi * sin_phi) / sin_phi);
         return YieldRegion::apex;
-    }
-
-    /// s -= multiplier D m, with the flow m = (1 + sin psi) on s[high] and -(1 - sin psi) on s[low].
-    void flow(Principal& s, std::size_t high, std::size_t low, double multiplier) const
-    {
-        const double volumetric = 2 * moduli_.lame() * sin_psi_ * multiplier, shear = 2 * moduli_.shear() * multiplier;
-        for (double& si : s)
-            si -= volumetric;
-        s[high] -= shear * (1 + sin_psi_);
-        s[low] += shear * (1 - sin_psi_);
     }
 
     /// Rankine's return: each principal stress above the tensile strength by associated flow; s[0] is above it.
@@ -161,6 +172,8 @@ struct MohrCoulomb
     MohrCoulombReturn back;
     Softening softening;
 
+    using Mask = Pack::mask_type;
+
     template <class T>
     struct State
     {
@@ -185,7 +198,7 @@ struct MohrCoulomb
 
     /// The same on the points [p, p + lanes).
     template <class Lanes>
-    void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
     {
         update(q, p, lanes, d, Strength<Pack>{Pack(strength.cohesion), Pack(strength.sin_phi)}, LocalDriver{});
     }
@@ -194,18 +207,26 @@ protected:
     /// What drives softening: the plastic shear strain of the point, at the end of the step.
     struct LocalDriver
     {
-        static double at_end(double own, double) { return own; }
+        template <class T>
+        TESTBED_INLINE static T at_end(T own, T)
+        {
+            return own;
+        }
         static const Field<double>& field(const Points& q) { return q.plastic_shear; }
     };
     /// A field that stays as it is within a step: the cohesion is known before the return.
     struct NonlocalDriver
     {
-        static double at_end(double, double given) { return given; }
+        template <class T>
+        TESTBED_INLINE static T at_end(T, T given)
+        {
+            return given;
+        }
         static const Field<double>& field(const Points& q) { return q.softening_strain; }
     };
 
     template <class T>
-    void elastic(State<T>& state, const Gradient<T>& d) const
+    TESTBED_INLINE void elastic(State<T>& state, const Gradient<T>& d) const
     {
         HypoelasticExactRotation::State<T> in_plane{state.stress};
         HypoelasticExactRotation{moduli}.update(in_plane, d);
@@ -215,16 +236,14 @@ protected:
 
     /// Whether the stress is admissible, for a double or for each lane of a pack.
     template <class T>
-    decltype(T{} <= T{}) inside(const State<T>& state, const Strength<T>& strength, const T& driver) const
+    TESTBED_INLINE decltype(T{} <= T{}) inside(const State<T>& state, const Strength<T>& strength, const T& driver) const
     {
         using std::sqrt;
         const SymTensor<T>& s = state.stress;
         const T mean = T(0.5) * (s.xx + s.yy), half = T(0.5) * (s.xx - s.yy);
         const T radius = sqrt(half * half + s.xy * s.xy);
         const T high = max(mean + radius, state.stress_zz), low = min(mean - radius, state.stress_zz);
-        const T cos_phi = sqrt(T(1.0) - strength.sin_phi * strength.sin_phi);
-        const T cohesion = strength.cohesion * softening.share(driver);
-        const T F = high * (T(1.0) + strength.sin_phi) - low * (T(1.0) - strength.sin_phi) - T(2.0) * cohesion * cos_phi;
+        const T F = back.yield_function(high, low, strength.sin_phi, strength.cohesion * softening.share(driver));
         const T rounding = T(1e-13) * (max(high, -high) + max(low, -low));
         return F <= rounding && high <= T(back.tensile_strength());
     }
@@ -263,28 +282,67 @@ protected:
         s = {new_mean + ratio * half, new_mean - ratio * half, ratio * s.xy};
     }
 
+    /// The return of the lanes of `yields` that end on a face with the cohesion that is left after a large strain, or is given; the other
+    /// ones stay as they are. Returns which.
+    template <class Driver>
+    TESTBED_INLINE Mask return_to_face(State<Pack>& state, const Strength<Pack>& point, Driver, Pack given, Mask yields) const
+    {
+        SymTensor<Pack>& s = state.stress;
+        const Pack mean = Pack(0.5) * (s.xx + s.yy), half = Pack(0.5) * (s.xx - s.yy), radius = sqrt(half * half + s.xy * s.xy);
+        const Pack high = mean + radius, low = mean - radius, zz = state.stress_zz;
+        const Mask zz_first = zz > high, zz_last = zz < low;
+        std::array<Pack, 3> n{max(high, zz), select(zz_first, high, select(zz_last, low, zz)), min(low, zz)};
+
+        const Pack share = softening.share(Driver::at_end(Pack(std::numeric_limits<double>::max()), given));
+        const Pack F = back.yield_function(n[0], n[2], point.sin_phi, share * point.cohesion);
+        const Pack multiplier = F / back.face_stiffness(point.sin_phi);
+        const Pack strain = state.plastic_shear_strain + Pack(2.0) * multiplier;
+        back.flow(n, 0, 2, multiplier);
+        const Mask on_face = yields && F > Pack(0.0) && n[0] >= n[1] && n[1] >= n[2] && n[0] <= Pack(back.tensile_strength()) &&
+                             softening.share(Driver::at_end(strain, given)) <= share;
+
+        const Pack new_high = select(zz_first, n[1], n[0]), new_low = select(zz_last, n[1], n[2]);
+        const Pack new_mean = Pack(0.5) * (new_high + new_low);
+        const Pack ratio = Pack(0.5) * (new_high - new_low) / select(radius > Pack(0.0), radius, Pack(1.0));
+        s = {select(on_face, new_mean + ratio * half, s.xx), select(on_face, new_mean - ratio * half, s.yy),
+             select(on_face, ratio * s.xy, s.xy)};
+        state.stress_zz = select(on_face, select(zz_first, n[0], select(zz_last, n[2], n[1])), zz);
+        state.plastic_shear_strain = select(on_face, strain, state.plastic_shear_strain);
+        return yields && !on_face;
+    }
+
+    /// plastic() for each lane of `yields`. Not inlined: few lanes come here, and the kernel keeps its registers.
+    template <class Driver>
+    [[gnu::noinline]] State<Pack> plastic_lanes(State<Pack> state, const Strength<Pack>& point, Driver driver, Pack given,
+                                                Mask yields) const
+    {
+        for (std::size_t k = 0; k < pack_size; ++k)
+            if (yields[k])
+            {
+                State<double> one{
+                    {state.stress.xx[k], state.stress.yy[k], state.stress.xy[k]}, state.stress_zz[k], state.plastic_shear_strain[k]};
+                plastic(one, Strength<>{point.cohesion[k], point.sin_phi[k]}, driver, given[k]);
+                state.stress.xx[k] = one.stress.xx;
+                state.stress.yy[k] = one.stress.yy;
+                state.stress.xy[k] = one.stress.xy;
+                state.stress_zz[k] = one.stress_zz;
+                state.plastic_shear_strain[k] = one.plastic_shear_strain;
+            }
+        return state;
+    }
+
     template <class Lanes, class Driver>
-    void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d, const Strength<Pack>& point, Driver driver) const
+    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d, const Strength<Pack>& point,
+                               Driver driver) const
     {
         State<Pack> state{
             {lanes.load(&q.sxx[p]), lanes.load(&q.syy[p]), lanes.load(&q.sxy[p])}, lanes.load(&q.szz[p]), lanes.load(&q.plastic_shear[p])};
         elastic(state, d);
         const Pack given = lanes.load(&Driver::field(q)[p]);
-        const auto yields = lanes.keep(!inside(state, point, given));
-        if (stdx::any_of(yields))
+        if (const Mask yields = lanes.keep(!inside(state, point, given)); stdx::any_of(yields))
         {
-            for (std::size_t k = 0; k < pack_size; ++k)
-                if (yields[k])
-                {
-                    State<double> one{
-                        {state.stress.xx[k], state.stress.yy[k], state.stress.xy[k]}, state.stress_zz[k], state.plastic_shear_strain[k]};
-                    plastic(one, Strength<>{point.cohesion[k], point.sin_phi[k]}, driver, given[k]);
-                    state.stress.xx[k] = one.stress.xx;
-                    state.stress.yy[k] = one.stress.yy;
-                    state.stress.xy[k] = one.stress.xy;
-                    state.stress_zz[k] = one.stress_zz;
-                    state.plastic_shear_strain[k] = one.plastic_shear_strain;
-                }
+            if (const Mask rest = return_to_face(state, point, driver, given, yields); stdx::any_of(rest))
+                state = plastic_lanes(state, point, driver, given, rest);
             lanes.store(&q.plastic_shear[p], state.plastic_shear_strain);
         }
         lanes.store(&q.sxx[p], state.stress.xx);
@@ -313,7 +371,7 @@ struct MohrCoulombField : MohrCoulomb
     }
 
     template <class Lanes>
-    void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
     {
         Strength<Pack> point{Pack(strength.cohesion), Pack(strength.sin_phi)};
         if constexpr (varying_strength)

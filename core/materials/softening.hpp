@@ -18,7 +18,7 @@ public:
     static Softening linear(double residual, double strain) { return {residual, (1 - residual) / strain}; }
 
     template <class T>
-    T share(const T& strain) const
+    TESTBED_INLINE T share(const T& strain) const
     {
         return max(T(residual_), T(1.0) - T(slope_) * strain);
     }

@@ -15,6 +15,7 @@ from scipy.stats import theilslopes
 REACH = 1.5  # half length of a normal over the half-maximum width of the band
 OUTER = 0.75  # beyond this share of the half length a normal shows the background
 STRENGTH = 0.25  # a band's mean strain above the background, on its axis, over the 99th percentile of the strain
+SLENDER = 2.0  # a band is at least so many times as long as wide: a bulge is none
 SHORTER = (1.0, 0.7, 0.5, 0.35)  # normals to begin with: long ones leave the body or meet the other band
 FEWEST = 8  # normals for an estimate
 ESTIMATORS = ("std", "integral", "half_max")
@@ -164,6 +165,12 @@ def _trace_all(field, x, bands, spacing):
     return bands
 
 
+def _length(x, band, spacing):
+    """Of the axis inside the body."""
+    along = x[np.abs(band.distance(x)) < spacing] @ band.tangent
+    return np.ptp(along) if len(along) else 0.0
+
+
 def _remains(field, x, band, spacing, other, least):
     """Whether a band without clear normals still exceeds `least` after the mean normal of the other one is taken out of the strain."""
     profile = other.normals.mean(axis=0)
@@ -175,13 +182,14 @@ def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
     """Up to `most` (1 or 2) bands, the strongest first. x (N, 2) initial positions, strain (N,), volume (N,), spacing of points [m].
 
     The second band is sought among the strips that lean to the other side, as conjugate bands do, which may cross the first one; if
-    there is none, outside the strip of the first. A band counts when its mean strain above the background, on its axis, exceeds `share`
-    of the 99th percentile of the strain.
+    there is none, outside the strip of the first. A band counts when it is slender and its mean strain above the background, on its axis,
+    exceeds `share` of the 99th percentile of the strain.
     """
     field, least = LinearNDInterpolator(x, strain), share * np.percentile(strain, 99)
 
     def strong(bands):
-        return sorted((b for b in _trace_all(field, x, bands, spacing) if b.strength > least), key=lambda b: -b.strength)
+        found = [b for b in _trace_all(field, x, bands, spacing) if b.strength > least and _length(x, b, spacing) > SLENDER * b.width]
+        return sorted(found, key=lambda b: -b.strength)
 
     first = _search(x, strain, volume, spacing)
     if most == 1:

@@ -72,6 +72,11 @@ def test_wide_bands_in_a_small_body_have_no_clear_normals_but_count(shape, width
     assert one.inclination == pytest.approx(45.0, abs=3.0)
 
 
+@pytest.mark.parametrize("shape", ["cosine", "triangle"])
+def test_a_bulge_is_no_band(shape):
+    assert find(0.025, [(shape, 1.8, 0.0, 0.3, (0.5, 1.0))]) == []
+
+
 def test_bands_that_do_not_cross():
     bands = find(0.0125, [("cosine", 0.15, 50.0, 0.3, (0.5, 0.6)), ("cosine", 0.15, 50.0, 0.2, (0.5, 1.4))])
     assert [band.inclination for band in bands] == pytest.approx([50.0, 50.0], abs=0.2)
