@@ -358,9 +358,12 @@ TEST(MohrCoulomb, BatchEqualsPointFunction)
         }
         EXPECT_GT(yielded, 50);
     };
-    const MohrCoulomb law = law_of(phi, c, 0.1, Softening::linear(0.5, 2e-3), 5000);
-    check(law, false, false);
-    check(MohrCoulombField<true, false>{law}, true, false);
-    check(MohrCoulombField<false, true>{law}, false, true);
-    check(MohrCoulombField<true, true>{law}, true, true);
+    for (const MohrCoulomb& law :
+         {law_of(phi, c, 0.1, Softening::linear(0.5, 2e-3), 5000), law_of(phi, c, 0.2, Softening::drop(0.5)), law_of(phi, c)})
+    {
+        check(law, false, false);
+        check(MohrCoulombField<true, false>{law}, true, false);
+        check(MohrCoulombField<false, true>{law}, false, true);
+        check(MohrCoulombField<true, true>{law}, true, true);
+    }
 }
