@@ -51,11 +51,9 @@ public:
             before.push_back({0, 0, 0, static_cast<std::uint32_t>(points.count)});
             marked_.assign(1, 1);
         }
-        for (const Bin& b : before)
-            slot_[lattice_.cell(b.i, b.j)] = -1;
         bins_.clear();
         count<Support>(points, before);
-        order();
+        order(before.size());
         arrange(before);
         marked_.assign(bins_.size(), 0);
         size_before_ = is_first ? 0 : before.size();
@@ -77,7 +75,7 @@ public:
 private:
     static constexpr std::uint32_t outside = ~std::uint32_t{0}, changed = outside;
 
-    /// Counts the points of each bin and lists the bins, in the order in which they are met.
+    /// Counts the points of each bin and lists the bins: first those of before, then new ones.
     template <class Support>
     void count(const Points& points, const std::vector<Bin>& before)
     {
@@ -99,6 +97,11 @@ private:
             }
             bins_[static_cast<std::size_t>(slot)].end += n;
         };
+        for (const Bin& b : before)
+        {
+            slot_[lattice_.cell(b.i, b.j)] = -1;
+            add(lattice_.cell(b.i, b.j), 0);
+        }
         for (std::size_t b = 0; b < before.size(); ++b)
             if (!marked_[b])
                 add(lattice_.cell(before[b].i, before[b].j), before[b].end - before[b].begin);
@@ -116,11 +119,20 @@ private:
                 }
     }
 
-    /// Bins in the order of their cells, with the place where the points of each begin.
-    void order()
+    /// Bins in the order of their cells, with the place where the points of each begin. The first `sorted` are in order already.
+    void order(std::size_t sorted)
     {
-        std::sort(bins_.begin(), bins_.end(),
-                  [&](const Bin& a, const Bin& b) { return lattice_.cell(a.i, a.j) < lattice_.cell(b.i, b.j); });
+        const auto by_cell = [&](const Bin& a, const Bin& b) { return lattice_.cell(a.i, a.j) < lattice_.cell(b.i, b.j); };
+        const auto middle = bins_.begin() + static_cast<std::ptrdiff_t>(sorted);
+        std::sort(middle, bins_.end(), by_cell);
+        std::inplace_merge(bins_.begin(), middle, bins_.end(), by_cell);
+        std::erase_if(bins_,
+                      [&](const Bin& b)
+                      {
+                          if (b.end == 0)
+                              slot_[lattice_.cell(b.i, b.j)] = -1;
+                          return b.end == 0;
+                      });
         std::uint32_t begin = 0;
         for (std::size_t b = 0; b < bins_.size(); ++b)
         {

@@ -24,6 +24,7 @@ namespace testbed
 {
 namespace stdx = std::experimental;
 using Pack = stdx::native_simd<double>;
+using Mask = Pack::mask_type;
 inline constexpr std::size_t pack_size = Pack::size();
 
 struct AllLanes
@@ -31,8 +32,8 @@ struct AllLanes
     static Pack load(const double* from) { return Pack(from, stdx::element_aligned); }
     static void store(double* to, Pack v) { v.copy_to(to, stdx::element_aligned); }
     static Pack keep(Pack v) { return v; }
-    static Pack::mask_type keep(Pack::mask_type m) { return m; }
-    static bool any(Pack::mask_type m) { return stdx::any_of(m); }
+    static Mask keep(Mask m) { return m; }
+    static bool any(Mask m) { return stdx::any_of(m); }
 };
 
 class SomeLanes
@@ -52,11 +53,11 @@ public:
         stdx::where(!mask_, v) = Pack(0.0);
         return v;
     }
-    Pack::mask_type keep(Pack::mask_type m) const { return m && mask_; }
-    bool any(Pack::mask_type m) const { return stdx::any_of(m && mask_); }
+    Mask keep(Mask m) const { return m && mask_; }
+    bool any(Mask m) const { return stdx::any_of(m && mask_); }
 
 private:
-    Pack::mask_type mask_;
+    Mask mask_;
 };
 
 /// Sets packs to zero one by one: a value-initialised array of them, or a loop over it, becomes a string instruction, which costs more
@@ -86,52 +87,52 @@ TESTBED_INLINE inline double sum(Pack v)
 {
     return stdx::reduce(v);
 }
-TESTBED_INLINE inline double sum(double v)
-{
-    return v;
-}
 
-namespace lanes
+namespace detail
 {
 using Vector [[gnu::vector_size(sizeof(Pack))]] = double;
-constexpr std::size_t W = pack_size;
 
-/// Neighbours added: single lanes, those of y put beside those of x, or pairs of lanes, those of y behind those of x.
+/// Neighbours added, with `zip` single lanes, (x0 + x1, y0 + y1, x2 + x3, ...), else pairs of lanes, first those of x, then those of y.
 template <bool zip, std::size_t... k>
 TESTBED_INLINE inline Vector fold(Vector x, Vector y, std::index_sequence<k...>)
 {
+    constexpr std::size_t W = pack_size;
     if constexpr (zip)
         return __builtin_shufflevector(x, y, (k % 2 == 0 ? k : W + k - 1)...) +
                __builtin_shufflevector(x, y, (k % 2 == 0 ? k + 1 : W + k)...);
     else
         return __builtin_shufflevector(x, y, (k / 2 * 4 + k % 2)...) + __builtin_shufflevector(x, y, (k / 2 * 4 + 2 + k % 2)...);
 }
+
 /// The sums of packs [first, first + count) by the lanes that they come to; count is a power of two, packs from N on are zero.
 template <std::size_t first, std::size_t count, std::size_t N>
-TESTBED_INLINE inline Vector sum(const std::array<Pack, N>& packs)
+TESTBED_INLINE inline Vector folded_sums(const std::array<Pack, N>& packs)
 {
     if constexpr (first >= N)
         return Vector{};
     else if constexpr (count == 1)
         return std::bit_cast<Vector>(packs[first]);
     else
-        return fold<count == 2>(sum<first, count / 2>(packs), sum<first + count / 2, count / 2>(packs), std::make_index_sequence<W>{});
+        return fold<count == 2>(folded_sums<first, count / 2>(packs), folded_sums<first + count / 2, count / 2>(packs),
+                                std::make_index_sequence<pack_size>{});
 }
-}  // namespace lanes
+}  // namespace detail
 
 /// The sums of N packs, to[0..N). Folded together: a fraction of the instructions of N sums.
 template <std::size_t first = 0, std::size_t N>
 TESTBED_INLINE inline void sum(const std::array<Pack, N>& packs, double* to)
 {
-    const lanes::Vector sums = lanes::sum<first, pack_size>(packs);
+    const detail::Vector sums = detail::folded_sums<first, pack_size>(packs);
     std::memcpy(to + first, &sums, std::min(pack_size, N - first) * sizeof(double));
     if constexpr (first + pack_size < N)
         sum<first + pack_size>(packs, to);
 }
+/// The larger one; with NaN either.
 TESTBED_INLINE inline Pack max(Pack a, Pack b)
 {
     return stdx::max(a, b);
 }
+/// The smaller one; with NaN either.
 TESTBED_INLINE inline Pack min(Pack a, Pack b)
 {
     return stdx::min(a, b);
@@ -145,7 +146,7 @@ TESTBED_INLINE inline double min(double a, double b)
     return a < b ? a : b;
 }
 
-TESTBED_INLINE inline Pack select(Pack::mask_type mask, Pack a, Pack b)
+TESTBED_INLINE inline Pack select(Mask mask, Pack a, Pack b)
 {
     stdx::where(mask, b) = a;
     return b;

@@ -146,7 +146,8 @@ void spread(const Lattice& lattice, const Body& body, std::size_t first_bin, std
     parallel_for(bins.size(),
                  [&](std::size_t b)
                  {
-                     std::array<Pack, S * S * Q> total{};
+                     std::array<Pack, S * S * Q> total;
+                     set_zero(total);
                      const BinFrame frame(lattice, bins[b]);
                      for_each_pack(bins[b].begin, bins[b].end,
                                    [&](std::size_t p, const auto& lanes)
@@ -162,8 +163,7 @@ void spread(const Lattice& lattice, const Body& body, std::size_t first_bin, std
                                                    total[(j * S + i) * Q + k] += w * value[k];
                                            }
                                    });
-                     double* to = &partial[(first_bin + b) * S * S * Q];
-                     sum(total, to);
+                     sum(total, &partial[(first_bin + b) * S * S * Q]);
                  });
 }
 

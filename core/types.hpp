@@ -37,6 +37,11 @@ Gradient<T> operator-(const Gradient<T>& a, const Gradient<T>& b)
 {
     return {a.xx - b.xx, a.yy - b.yy, a.xy - b.xy, a.yx - b.yx};
 }
+template <class T, class U>
+Gradient<T> operator*(const T& factor, const Gradient<U>& a)
+{
+    return {factor * T(a.xx), factor * T(a.yy), factor * T(a.xy), factor * T(a.yx)};
+}
 
 /// A run that cannot go on: points left the lattice, a value is not finite. The run ends as `diverged`.
 struct Diverged : std::runtime_error

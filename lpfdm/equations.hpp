@@ -137,23 +137,23 @@ inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& 
         });
 }
 
-/// What is constant in a bin: the gradient of the increment in its S x S cells, and the velocity of its (S+1) x (S+1) nodes.
+/// What is constant in a bin: the gradient of the increment averaged over a box, and the velocity of its (S+1) x (S+1) nodes.
 template <class Support>
 struct BinMotion
 {
     static constexpr int S = Support::S;
-    std::array<Gradient<>, S * S> mean;  ///< over a box: coefficients of 1, a, b and a b, where a and b are its shares in the next cells
+    std::array<Gradient<>, S * S> coefficients;  ///< of 1, a, b and a b, with the shares a and b of a box in the next cells
     std::array<double, (S + 1) * (S + 1)> vx, vy;
 
     TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin)
     {
         const auto cell = [&](int i, int j) { return grid.cells.gradient(grid.lattice.cell(bin.i + i, bin.j + j)); };
-        mean[0] = cell(0, 0);
+        coefficients[0] = cell(0, 0);
         if constexpr (S == 2)
         {
-            mean[1] = cell(1, 0) - cell(0, 0);
-            mean[2] = cell(0, 1) - cell(0, 0);
-            mean[3] = cell(1, 1) - cell(1, 0) - mean[2];
+            coefficients[1] = cell(1, 0) - cell(0, 0);
+            coefficients[2] = cell(0, 1) - cell(0, 0);
+            coefficients[3] = cell(1, 1) - cell(1, 0) - coefficients[2];
         }
         for (int j = 0; j <= S; ++j)
             for (int i = 0; i <= S; ++i)
@@ -165,16 +165,12 @@ struct BinMotion
     }
     TESTBED_INLINE Gradient<Pack> gradient(const Corner& c) const
     {
-        const auto constant = [](const Gradient<>& g) { return Gradient<Pack>{Pack(g.xx), Pack(g.yy), Pack(g.xy), Pack(g.yx)}; };
-        const auto times = [](Pack w, const Gradient<>& g) {
-            return Gradient<Pack>{w * Pack(g.xx), w * Pack(g.yy), w * Pack(g.xy), w * Pack(g.yx)};
-        };
-        Gradient<Pack> d = constant(mean[0]);
+        Gradient<Pack> d = Pack(1.0) * coefficients[0];
         if constexpr (S == 2)
         {
             const Weights<Support> weights(c);
             const Pack a = weights.x[1], b = weights.y[1];
-            d = d + times(a, mean[1]) + times(b, mean[2]) + times(a * b, mean[3]);
+            d = d + a * coefficients[1] + b * coefficients[2] + (a * b) * coefficients[3];
         }
         return d;
     }

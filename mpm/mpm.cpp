@@ -385,7 +385,7 @@ private:
         moved_ = moved;
     }
     /// Whether points left the lattice: with shapes that begin half a cell from the point they do so in the middle of a bin.
-    Pack::mask_type outside(Pack x, Pack y) const
+    Mask outside(Pack x, Pack y) const
     {
         const Vec2 &low = lattice_.origin, high{low[0] + lattice_.nx * lattice_.cell_size, low[1] + lattice_.ny * lattice_.cell_size};
         return !(x >= Pack(low[0]) && x < Pack(high[0]) && y >= Pack(low[1]) && y < Pack(high[1]));

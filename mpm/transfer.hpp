@@ -268,7 +268,7 @@ struct NodalVelocity
             d.xx += correction;
             d.yy += correction;
         }
-        return {d.xx * Pack(dt), d.yy * Pack(dt), d.xy * Pack(dt), d.yx * Pack(dt)};
+        return Pack(dt) * d;
     }
 };
 }  // namespace testbed

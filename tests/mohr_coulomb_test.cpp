@@ -306,7 +306,8 @@ TEST(MohrCoulomb, ClosedCyclesDissipate)
     }
 }
 
-/// The batch form equals the point function, in all four variants, whole packs and rests.
+/// The batch form equals the point function, in all four variants, whole packs and rests, lanes that yield beside such that do not, and
+/// with the out-of-plane stress in the middle, above and below.
 TEST(MohrCoulomb, BatchEqualsPointFunction)
 {
     const auto check = [](const auto& law, bool varying, bool nonlocal)
@@ -320,7 +321,7 @@ TEST(MohrCoulomb, BatchEqualsPointFunction)
         law.allocate(q);
         std::vector<State> state(n);
         std::vector<MohrCoulomb> own(n, law);
-        int yielded = 0;
+        int yielded = 0, elastic = 0, zz_first = 0, zz_last = 0;
         for (std::size_t p = 0; p < n; ++p)
         {
             if (varying)
@@ -337,29 +338,55 @@ TEST(MohrCoulomb, BatchEqualsPointFunction)
                 own[p].softening = Softening{};
             }
         }
-        for (int step = 0; step < 30; ++step)
+        std::vector<double> xx(n), yy(n), xy(n), yx(n);
+        for (int step = 0; step < 60; ++step)
         {
-            const Gradient<> d{random(-2e-4, 2e-4), random(-2e-4, 2e-4), random(-1e-3, 1e-3), random(-1e-3, 1e-3)};
+            for (std::size_t p = 0; p < n; ++p)
+            {
+                const bool biaxial = step % 2 == 0;  // both normal strains of one sign take the stress out of the plane to the end
+                const double shear = biaxial ? 1e-4 : 4e-4;
+                xx[p] = random(-1e-3, 1e-3);
+                yy[p] = biaxial ? random(0.3, 0.7) * xx[p] : random(-4e-4, 4e-4);
+                xy[p] = random(-shear, shear);
+                yx[p] = random(-shear, shear);
+            }
             for_each_pack(0, n,
-                          [&](std::size_t p, const auto& lanes) {
-                              law.update(q, p, lanes, Gradient<Pack>{Pack(d.xx), Pack(d.yy), Pack(d.xy), Pack(d.yx)});
+                          [&](std::size_t p, const auto& lanes)
+                          {
+                              const auto at = [&](const std::vector<double>& v) { return lanes.load(&v[p]); };
+                              law.update(q, p, lanes, Gradient<Pack>{at(xx), at(yy), at(xy), at(yx)});
                           });
             for (std::size_t p = 0; p < n; ++p)
             {
-                own[p].update(state[p], d);
+                const double before = state[p].plastic_shear_strain;
+                own[p].update(state[p], {xx[p], yy[p], xy[p], yx[p]});
                 const double level = 1e-9 * c;
                 EXPECT_NEAR(q.sxx[p], state[p].stress.xx, level);
                 EXPECT_NEAR(q.syy[p], state[p].stress.yy, level);
                 EXPECT_NEAR(q.sxy[p], state[p].stress.xy, level);
                 EXPECT_NEAR(q.szz[p], state[p].stress_zz, level);
                 EXPECT_NEAR(q.plastic_shear[p], state[p].plastic_shear_strain, 1e-13);
-                yielded += state[p].plastic_shear_strain > 0;
+                if (state[p].plastic_shear_strain > before)
+                    ++yielded;
+                else
+                    ++elastic;
+                const SymTensor<>& s = state[p].stress;
+                const double mean = 0.5 * (s.xx + s.yy), radius = std::hypot(0.5 * (s.xx - s.yy), s.xy);
+                zz_first += state[p].plastic_shear_strain > before && state[p].stress_zz > mean + radius * 1.01;
+                zz_last += state[p].plastic_shear_strain > before && state[p].stress_zz < mean - radius * 1.01;
             }
         }
-        EXPECT_GT(yielded, 50);
+        EXPECT_GT(elastic, 50);
+        if (law.moduli.poissons_ratio() < 0.2)  // at 0.47 the pressure keeps such points elastic
+        {
+            EXPECT_GT(zz_first, 10);
+            EXPECT_GT(zz_last, 10);
+        }
     };
-    for (const MohrCoulomb& law :
-         {law_of(phi, c, 0.1, Softening::linear(0.5, 2e-3), 5000), law_of(phi, c, 0.2, Softening::drop(0.5)), law_of(phi, c)})
+    const ElasticModuli dry(5e7, 0.1);
+    const MohrCoulomb dry_soil{dry, {c, std::sin(phi)}, {dry, std::sin(0.1), none}, Softening::drop(0.5)};
+    for (const MohrCoulomb& law : {dry_soil, law_of(phi, c, 0.1, Softening::linear(0.5, 2e-3), 5000),
+                                   law_of(phi, c, 0.2, Softening::drop(0.5)), law_of(phi, c), law_of(0, c)})
     {
         check(law, false, false);
         check(MohrCoulombField<true, false>{law}, true, false);

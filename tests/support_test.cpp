@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 using namespace testbed;
 
 namespace
@@ -100,4 +102,61 @@ TEST(Lanes, MaskWhatLiesBehindTheEnd)
     EXPECT_DOUBLE_EQ(total, static_cast<double>(pack_size) + 3);
     for (std::size_t k = 0; k < data.size(); ++k)
         EXPECT_DOUBLE_EQ(data[k], k >= 2 && k < 5 + pack_size ? 2 : 1) << k;
+}
+
+/// A support leaves its bin beyond the tolerance of rounding on both sides, and counts as having left where it is not a number or the
+/// point is turned inside out; lanes behind the end do not count.
+TEST(BinFrame, SeesWhoLeft)
+{
+    const Lattice lattice{{0, 0}, 1.0, 4, 4};
+    const BinFrame frame(lattice, Bin{1, 1, 0, 1});
+    Points q;
+    q.count = 2 * pack_size;
+    q.volume.activate(q.count);
+    q.half_x.activate(q.count);
+    q.half_y.activate(q.count);
+    const auto reset = [&]
+    {
+        for (std::size_t p = 0; p < q.count; ++p)
+            q.volume[p] = q.half_x[p] = q.half_y[p] = 0.2;
+    };
+    const auto left = [&](double ax, double ay)
+    {
+        Corner c{Pack(0.5), Pack(0.5), Pack(0.4), Pack(0.4)};
+        c.ax[pack_size - 1] = ax;
+        c.ay[pack_size - 1] = ay;
+        const bool point = frame.left<PointSupport>(q, 0, AllLanes{}, c), box = frame.left<DomainSupport>(q, 0, AllLanes{}, c);
+        EXPECT_EQ(point, box);
+        return point;
+    };
+    reset();
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_FALSE(left(0, 0));
+    EXPECT_FALSE(left(-0.5e-9, 1 - 2e-9));
+    for (const double out : {-2e-9, 1.0, nan})
+    {
+        EXPECT_TRUE(left(out, 0.5)) << out;
+        EXPECT_TRUE(left(0.5, out)) << out;
+    }
+    const Corner inside{Pack(0.5), Pack(0.5), Pack(0.4), Pack(0.4)};
+    for (const double bad : {0.0, -1.0, nan})
+    {
+        for (Field<double>* field : {&q.half_x, &q.half_y})
+        {
+            reset();
+            (*field)[0] = bad;
+            EXPECT_TRUE(frame.left<DomainSupport>(q, 0, AllLanes{}, inside)) << bad;
+        }
+        reset();
+        q.volume[0] = bad;
+        EXPECT_TRUE(frame.left<PointSupport>(q, 0, AllLanes{}, inside)) << bad;
+    }
+    reset();
+    Corner behind = inside;
+    if (pack_size > 1)
+    {
+        behind.ax[pack_size - 1] = nan;
+        EXPECT_FALSE(frame.left<PointSupport>(q, 0, SomeLanes{pack_size - 1}, behind));
+        EXPECT_TRUE(frame.left<PointSupport>(q, 0, AllLanes{}, behind));
+    }
 }

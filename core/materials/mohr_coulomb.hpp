@@ -49,7 +49,7 @@ public:
     }
     double tensile_strength() const { return tensile_strength_; }
 
-    /// T is double or a pack, here and below.
+    /// T is double or a pack, in all templates here.
     template <class T>
     TESTBED_INLINE static T yield_function(T s1, T s3, T sin_phi, T cohesion)
     {
@@ -172,8 +172,6 @@ struct MohrCoulomb
     MohrCoulombReturn back;
     Softening softening;
 
-    using Mask = Pack::mask_type;
-
     template <class T>
     struct State
     {
@@ -282,8 +280,8 @@ protected:
         s = {new_mean + ratio * half, new_mean - ratio * half, ratio * s.xy};
     }
 
-    /// The return of the lanes of `yields` that end on a face with the cohesion that is left after a large strain, or is given; the other
-    /// ones stay as they are. Returns which.
+    /// The return of the lanes of `yields` that end on a face with the cohesion that is left after a large strain, or is given. Returns the
+    /// lanes of `yields` that end elsewhere; they are left as they are.
     template <class Driver>
     TESTBED_INLINE Mask return_to_face(State<Pack>& state, const Strength<Pack>& point, Driver, Pack given, Mask yields) const
     {
@@ -297,9 +295,10 @@ protected:
         const Pack F = back.yield_function(n[0], n[2], point.sin_phi, share * point.cohesion);
         const Pack multiplier = F / back.face_stiffness(point.sin_phi);
         const Pack strain = state.plastic_shear_strain + Pack(2.0) * multiplier;
+        const Pack driver = Driver::at_end(strain, given);
         back.flow(n, 0, 2, multiplier);
         const Mask on_face = yields && F > Pack(0.0) && n[0] >= n[1] && n[1] >= n[2] && n[0] <= Pack(back.tensile_strength()) &&
-                             softening.share(Driver::at_end(strain, given)) <= share;
+                             driver == driver && softening.share(driver) <= share;  // not NaN, which share() may lose
 
         const Pack new_high = select(zz_first, n[1], n[0]), new_low = select(zz_last, n[1], n[2]);
         const Pack new_mean = Pack(0.5) * (new_high + new_low);
@@ -311,13 +310,12 @@ protected:
         return yields && !on_face;
     }
 
-    /// plastic() for each lane of `yields`. Not inlined: few lanes come here, and the kernel keeps its registers.
+    /// plastic() for each lane of `rest`. Not inlined, so that the kernel keeps its registers where no lane comes here.
     template <class Driver>
-    [[gnu::noinline]] State<Pack> plastic_lanes(State<Pack> state, const Strength<Pack>& point, Driver driver, Pack given,
-                                                Mask yields) const
+    [[gnu::noinline]] State<Pack> plastic_lanes(State<Pack> state, const Strength<Pack>& point, Driver driver, Pack given, Mask rest) const
     {
         for (std::size_t k = 0; k < pack_size; ++k)
-            if (yields[k])
+            if (rest[k])
             {
                 State<double> one{
                     {state.stress.xx[k], state.stress.yy[k], state.stress.xy[k]}, state.stress_zz[k], state.plastic_shear_strain[k]};

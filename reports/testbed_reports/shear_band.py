@@ -15,7 +15,7 @@ from scipy.stats import theilslopes
 REACH = 1.5  # half length of a normal over the half-maximum width of the band
 OUTER = 0.75  # beyond this share of the half length a normal shows the background
 STRENGTH = 0.25  # a band's mean strain above the background, on its axis, over the 99th percentile of the strain
-SLENDER = 2.0  # a band is at least so many times as long as wide: a bulge is none
+SLENDER = 2.0  # a band is more than so many times as long as wide: a bulge is none
 SHORTER = (1.0, 0.7, 0.5, 0.35)  # normals to begin with: long ones leave the body or meet the other band
 FEWEST = 8  # normals for an estimate
 ESTIMATORS = ("std", "integral", "half_max")
@@ -126,7 +126,8 @@ def _sample(field, x, band, spacing, others):
 
 
 def _measure(field, x, band, spacing, others):
-    """The band with the normals, the width and the strength that its axis has; None when it has too few normals; and where they stand (S,) [m]."""
+    """The band with the normals, the width and the strength that its axis has, None when it has too few normals; and where they stand
+    (S,) [m]."""
     s, d, excess, clear = _sample(field, x, band, spacing, others)
     total, top = excess.sum(axis=1), excess.max(axis=1)
     good = (total > 0) & (top > 0.3 * np.median(top)) if len(top) else np.zeros(0, bool)
@@ -138,7 +139,7 @@ def _measure(field, x, band, spacing, others):
 
 
 def _turn(field, x, band, spacing, others):
-    """The band with its axis through the centroids of its normals; None where it loses its clear normals."""
+    """The band with its axis through the centroids of its normals; None when it has no clear normals on the way there."""
     for _ in range(5):
         found, s = _measure(field, x, band, spacing, others)
         if found is None or not found.clear:
@@ -165,9 +166,10 @@ def _trace_all(field, x, bands, spacing):
     return bands
 
 
-def _length(x, band, spacing):
-    """Of the axis inside the body."""
-    along = x[np.abs(band.distance(x)) < spacing] @ band.tangent
+def _length(x, strain, band, spacing):
+    """Of the axis [m], as far as the strain exceeds half the band's."""
+    on_axis = (np.abs(band.distance(x)) < spacing) & (strain > np.median(strain) + 0.5 * band.strength)
+    along = x[on_axis] @ band.tangent
     return np.ptp(along) if len(along) else 0.0
 
 
@@ -183,12 +185,14 @@ def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
 
     The second band is sought among the strips that lean to the other side, as conjugate bands do, which may cross the first one; if
     there is none, outside the strip of the first. A band counts when it is slender and its mean strain above the background, on its axis,
-    exceeds `share` of the 99th percentile of the strain.
+    exceeds `share` of the 99th percentile of the strain. A body of a few points, or in which nothing varies, has none.
     """
+    if len(x) < FEWEST or np.ptp(x, axis=0).min() < spacing:
+        return []
     field, least = LinearNDInterpolator(x, strain), share * np.percentile(strain, 99)
 
     def strong(bands):
-        found = [b for b in _trace_all(field, x, bands, spacing) if b.strength > least and _length(x, b, spacing) > SLENDER * b.width]
+        found = [b for b in _trace_all(field, x, bands, spacing) if b.strength > least and _length(x, strain, b, spacing) > SLENDER * b.width]
         return sorted(found, key=lambda b: -b.strength)
 
     first = _search(x, strain, volume, spacing)
@@ -197,6 +201,7 @@ def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
     conjugate = strong([first, _search(x, strain, volume, spacing, range(-89, 0) if first.angle > 0 else range(1, 90))])
     if len(conjugate) == 2 and (conjugate[1].clear or _remains(field, x, conjugate[1], spacing, conjugate[0], least)):
         return conjugate
+    first = conjugate[0] if conjugate else first
     free = np.abs(first.distance(x)) > 1.5 * first.width
     return strong([first, _search(x[free], strain[free], volume[free], spacing)] if free.sum() >= 10 else [first])
 

@@ -77,7 +77,10 @@ def _spacing(snapshot):
 def _plastic(snapshot):
     if "plastic_shear_strain" not in snapshot:
         raise MetricError(f"snapshot {snapshot.name} lacks the field plastic_shear_strain")
-    return snapshot["plastic_shear_strain"]
+    strain = snapshot["plastic_shear_strain"]
+    if not np.isfinite(strain).all():
+        raise MetricError(f"snapshot {snapshot.name}: plastic_shear_strain is not finite")
+    return strain
 
 
 def shear_band(result):

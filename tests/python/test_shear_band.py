@@ -77,10 +77,25 @@ def test_a_bulge_is_no_band(shape):
     assert find(0.025, [(shape, 1.8, 0.0, 0.3, (0.5, 1.0))]) == []
 
 
-def test_bands_that_do_not_cross():
-    bands = find(0.0125, [("cosine", 0.15, 50.0, 0.3, (0.5, 0.6)), ("cosine", 0.15, 50.0, 0.2, (0.5, 1.4))])
+def test_a_spot_is_no_band():
+    x = lattice(1.0, 2.0, 0.025)[:, :2]
+    for area in (0.02, 0.1):
+        strain = 0.02 + 0.3 * np.exp(-((x - (0.5, 1.0)) ** 2).sum(axis=1) / area)
+        assert find_bands(x, strain, np.full(len(x), 0.025**2), 0.025) == []
+
+
+@pytest.mark.parametrize("points", [1, 2, 50])
+def test_too_few_points_have_no_band(points):
+    x = np.stack([np.zeros(points), np.arange(points)], axis=1)
+    assert find_bands(x, np.ones(points), np.ones(points), 1.0) == []
+
+
+@pytest.mark.parametrize("second, distance", [(0.2, 0.8), (0.3, 0.3)])
+def test_bands_that_do_not_cross(second, distance):
+    centre = 1.0 - 0.5 * distance / np.cos(np.radians(50.0)), 1.0 + 0.5 * distance / np.cos(np.radians(50.0))
+    bands = find(0.0125, [("cosine", 0.15, 50.0, 0.3, (0.5, centre[0])), ("cosine", 0.15, 50.0, second, (0.5, centre[1]))])
     assert [band.inclination for band in bands] == pytest.approx([50.0, 50.0], abs=0.2)
-    assert [band.strength for band in bands] == pytest.approx([0.3, 0.2], rel=0.03)
+    assert [band.strength for band in bands] == pytest.approx([0.3, second], rel=0.03)
 
 
 def test_two_cells_wide_is_enough_for_an_angle():
