@@ -394,3 +394,21 @@ TEST(MohrCoulomb, BatchEqualsPointFunction)
         check(MohrCoulombField<true, true>{law}, true, true);
     }
 }
+
+/// A strain that is not a number shows in the stress of its point, and in no other.
+TEST(MohrCoulomb, BatchKeepsNaN)
+{
+    const MohrCoulombField<false, true> law{law_of(phi, c, 0, Softening::linear(0.5, 2e-3))};
+    Points q;
+    q.count = pack_size;
+    for (Field<double>* f : {&q.sxx, &q.syy, &q.sxy})
+        f->activate(q.count);
+    law.allocate(q);
+    q.softening_strain[0] = std::numeric_limits<double>::quiet_NaN();
+    law.update(q, 0, AllLanes{}, Gradient<Pack>{Pack(0.0), Pack(0.0), Pack(1e-3), Pack(1e-3)});
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        EXPECT_EQ(std::isfinite(q.sxy[p]), p > 0) << p;
+        EXPECT_EQ(q.plastic_shear[p] > 0, p > 0) << p;
+    }
+}
