@@ -139,6 +139,11 @@ void bench(const BenchOptions& options, const MakeSolver& make_solver)
     for (const std::string& method : methods)
         if (std::string(find_variant(method).family) == "fem")
             throw SceneError("bench: the FEM reference has no particles");
+    for (const double points : options.points)
+        if (!(points >= 16 && points <= 1e9))
+            throw SceneError(fmt::format("bench: --points from 16 to 1e9, not {}", points));
+    if (!(options.seconds > 0 && options.seconds <= 3600))
+        throw SceneError(fmt::format("bench: --seconds above 0 and at most 3600, not {}", options.seconds));
     const int all = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     std::vector<int> teams = options.threads;
     if (teams.empty())

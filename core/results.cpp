@@ -42,6 +42,15 @@ void check(herr_t status)
 }
 }  // namespace
 
+namespace
+{
+bool is_absent_or_file(const std::filesystem::path& path)
+{
+    std::error_code ignored;
+    return !std::filesystem::exists(path, ignored) || std::filesystem::is_regular_file(path, ignored);
+}
+}  // namespace
+
 struct ResultFile::Impl
 {
     std::string path, part;
@@ -103,6 +112,8 @@ struct ResultFile::Impl
 
 ResultFile::ResultFile(const std::string& path) : impl_(std::make_unique<Impl>())
 {
+    if (!is_absent_or_file(path))
+        throw OutputError(fmt::format("cannot write '{}': it exists and is no file", path));
     impl_->path = path;
     impl_->part = path + ".part";
     H5dont_atexit();  // its clean-up crashes after a write that failed; every file is closed here
@@ -182,18 +193,20 @@ void ResultFile::flush()
 
 void write_text(const std::filesystem::path& path, const std::string& text)
 {
-    const std::filesystem::path part = path.string() + ".part";
+    const bool replaces = is_absent_or_file(path);  // a pipe or a device is written to
+    const std::filesystem::path part = replaces ? path.string() + ".part" : path.string();
     std::ofstream file(part);
     file << text;
     file.close();
     std::error_code error;
-    if (file)
+    if (file && replaces)
         std::filesystem::rename(part, path, error);
     if (!file || error)
     {
         const int reason = errno;
         std::error_code ignored;
-        std::filesystem::remove(part, ignored);
+        if (replaces)
+            std::filesystem::remove(part, ignored);
         throw OutputError(fmt::format("cannot write '{}': {}", path.string(), error ? error.message() : std::strerror(reason)));
     }
 }

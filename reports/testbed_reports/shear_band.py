@@ -202,7 +202,7 @@ def find_bands(x, strain, volume, spacing, most=2, share=STRENGTH):
     if len(conjugate) == 2 and (conjugate[1].clear or _remains(field, x, conjugate[1], spacing, conjugate[0], least)):
         return conjugate
     first = conjugate[0] if conjugate else first
-    free = np.abs(first.distance(x)) > 1.5 * first.width
+    free = np.abs(first.distance(x)) > max(1.5 * first.width, 3.0 * spacing)
     return strong([first, _search(x[free], strain[free], volume[free], spacing)] if free.sum() >= 10 else [first])
 
 

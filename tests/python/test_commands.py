@@ -102,6 +102,24 @@ def test_unwritable_output(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_pipes_and_devices_are_not_replaced(tmp_path):
+    for name in ("r.h5", "stress.csv"):
+        os.mkfifo(tmp_path / name)
+    done = run("run", COLUMN, "-o", tmp_path / "r.h5")
+    assert done.returncode == 1 and "is no file" in done.stderr
+    law = str(ROOT / "benchmarks" / "laws" / "mohr_coulomb.toml")
+    read = subprocess.Popen(["cat", tmp_path / "stress.csv"], stdout=subprocess.PIPE)
+    assert run("point", law, "-o", tmp_path / "stress.csv").returncode == 0
+    assert read.communicate(timeout=20)[0].decode() == run("point", law).stdout
+    assert all((tmp_path / name).is_fifo() for name in ("r.h5", "stress.csv"))
+
+
+@pytest.mark.parametrize("arguments", [["--points", "nan"], ["--points", "0"], ["--seconds", "nan"], ["--seconds", "0"]])
+def test_bench_refuses_what_it_cannot_measure(arguments):
+    done = run("bench", "--method", "lpfdm", "--law", "elastic", *arguments)
+    assert done.returncode == 1 and arguments[0] in done.stderr
+
+
 @pytest.mark.parametrize("limit", [1000, 30000, 100000])
 def test_full_disk_leaves_no_half_result(tmp_path, limit):
     done = run("run", COLUMN, "-o", tmp_path / "r.h5",

@@ -84,6 +84,16 @@ def test_a_spot_is_no_band():
         assert find_bands(x, strain, np.full(len(x), 0.025**2), 0.025) == []
 
 
+@pytest.mark.parametrize("degrees", [35.0, 50.0, 65.0])
+def test_a_band_one_point_wide_is_one(degrees):
+    x = lattice(1.0, 2.0, 0.025)[:, :2]
+    normal = np.array([-np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
+    d = (x - (0.5, 1.0)) @ normal
+    strain = 0.02 + 0.3 * 2.0 ** (-(2.0 * d / 0.025) ** 2)
+    band, = find_bands(x, strain, np.full(len(x), 0.025**2), 0.025)
+    assert band.inclination == pytest.approx(degrees, abs=1.0)  # it is resolved no better
+
+
 @pytest.mark.parametrize("points", [1, 2, 50])
 def test_too_few_points_have_no_band(points):
     x = np.stack([np.zeros(points), np.arange(points)], axis=1)
