@@ -70,7 +70,7 @@ def rates_figure(rows, style):
                     axis.plot(*zip(*own), **{**style.of(method), **({} if threads == 1 else {"linewidth": 0.6, "markersize": 2.5})})
         axis.set_xscale("log")
         axis.set_yscale("log")
-        axis.set_title(law.replace("_", "-").capitalize(), fontsize=8, pad=3)
+        axis.set_title(law.replace("_", "-").title(), fontsize=8, pad=3)
         axis.yaxis.set_minor_formatter(NullFormatter())
         axis.set_xlabel("Points")
     axes[0, 0].set_ylabel("Particle-steps per second [10⁶/s]")
