@@ -6,17 +6,24 @@
 
 namespace testbed
 {
-/// Sums of the points of one bin, where they are now. A loop of its own: with the sums of several cells or nodes beside what else a pass
-/// computes, the registers would not do, and the points of a bin are still in the nearest cache.
+/// Sums of the points of one bin, where they are now, and whether one of them left it: the sums are then not right. A loop of its own: with
+/// the sums of several cells or nodes beside what else a pass computes, the registers would not do, and the points of a bin are still in
+/// the nearest cache.
 template <class Support, class Sums>
-TESTBED_INLINE inline void sum_bin(const Lattice& lattice, const Body& body, const Bin& bin, double* to)
+TESTBED_INLINE inline bool sum_bin(const Lattice& lattice, const Body& body, const Bin& bin, double* to)
 {
     const BinFrame frame(lattice, bin);
     Sums sums(lattice, bin);
+    Mask left(false);
     for_each_pack(bin.begin, bin.end,
                   [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                  { sums.add(body, p, lanes, frame.template corner<Support>(body.points, p, lanes)); });
+                  {
+                      const Corner c = frame.template corner<Support>(body.points, p, lanes);
+                      left |= frame.template left<Support>(body.points, p, lanes, c);
+                      sums.add(body, p, lanes, c);
+                  });
     sums.write(body, bin, to);
+    return stdx::any_of(left);
 }
 
 /// @tparam Sums of one bin: Sums::numbers, Sums(lattice, bin), add(body, p, lanes, corner), write(body, bin, to)

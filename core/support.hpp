@@ -72,10 +72,14 @@ struct Weights
 /// Maps points to the coordinates of their bin.
 struct BinFrame
 {
+    const Lattice& lattice;
+    const Bin& bin;
     double scale, x0, y0;  ///< 1/L; bin corner in cells from the coordinate origin
 
-    BinFrame(const Lattice& lattice, const Bin& bin)
-        : scale(1 / lattice.cell_size),
+    BinFrame(const Lattice& in, const Bin& of)
+        : lattice(in),
+          bin(of),
+          scale(1 / lattice.cell_size),
           x0(lattice.origin[0] * scale + bin.i),
           y0(lattice.origin[1] * scale + bin.j)
     {
@@ -99,17 +103,27 @@ struct BinFrame
     {
         return corner<Support>(q, p, lanes, lanes.load(&q.x[p]), lanes.load(&q.y[p]));
     }
-    /// Whether the support of one of the points, at c, begins in another bin, or one of them is turned inside out; the volume must
-    /// be up to date.
+    /// Which of the points, with their support at c, may no longer belong to the bin: the support begins in another one, the point has
+    /// left the lattice or is turned inside out.
     template <class Support, class Lanes>
-    TESTBED_INLINE bool left(const Points& q, std::size_t p, const Lanes& lanes, const Corner& c) const
+    TESTBED_INLINE Mask left(const Points& q, std::size_t p, const Lanes& lanes, const Corner& c) const
     {
-        const auto in = is_in_bin(c.ax) && is_in_bin(c.ay);
+        Mask in = is_in_bin(c.ax) && is_in_bin(c.ay);
         if constexpr (Support::has_box)
-            return lanes.any(!(in && lanes.load(&q.half_x[p]) > Pack(0.0) && lanes.load(&q.half_y[p]) > Pack(0.0)));
+            in = in && lanes.load(&q.half_x[p]) > Pack(0.0) && lanes.load(&q.half_y[p]) > Pack(0.0);
         else
-            return lanes.any(!(in && lanes.load(&q.volume[p]) > Pack(0.0)));
+        {
+            in = in && lanes.load(&q.volume[p]) > Pack(0.0);
+            if constexpr (Support::half_width > 0)  // the edge of the lattice lies in the middle of a bin
+                in = in && is_inside(c.ax + Pack(Support::half_width + bin.i), lattice.nx) &&
+                     is_inside(c.ay + Pack(Support::half_width + bin.j), lattice.ny);
+        }
+        return lanes.keep(!in);
     }
+
+private:
+    /// A coordinate in cells, of n.
+    TESTBED_INLINE static Mask is_inside(Pack v, int n) { return v > Pack(bin_tolerance) && v < Pack(n - bin_tolerance); }
 };
 
 /// Volume of a pack of points [m^2].

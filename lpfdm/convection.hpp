@@ -11,13 +11,13 @@ using Velocity = std::array<Pack, 2>;
 struct UpwindConvection
 {
     /// Eq. (13) as printed.
-    static Velocity correct(const Velocity& v, const Gradient<Pack>& g)
+    TESTBED_INLINE static Velocity correct(const Velocity& v, const Gradient<Pack>& g)
     {
         return {v[0] - v[0] * g.xx - v[1] * g.xy, v[1] - v[0] * g.yx - v[1] * g.yy};
     }
 
     template <class Lanes>
-    static Gradient<Pack> gradient(const LpfdmGrid& grid, std::size_t first_cell, const Lanes& lanes, Pack cx, Pack cy)
+    TESTBED_INLINE static Gradient<Pack> gradient(const LpfdmGrid& grid, std::size_t first_cell, const Lanes& lanes, Pack cx, Pack cy)
     {
         const auto right = cx > Pack(0.0), up = cy > Pack(0.0);
         Gradient<Pack> g{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
@@ -42,14 +42,14 @@ struct CentralConvection
 {
     /// The node takes the velocity of what arrives from x - dt v', which for a linear field is (I + G) v' = v. Eq. (13) is its
     /// first order; what it drops adds up to a gain of angular momentum and energy in rotation.
-    static Velocity correct(const Velocity& v, const Gradient<Pack>& g)
+    TESTBED_INLINE static Velocity correct(const Velocity& v, const Gradient<Pack>& g)
     {
         const Pack one(1.0), inverse = one / ((one + g.xx) * (one + g.yy) - g.xy * g.yx);
         return {((one + g.yy) * v[0] - g.xy * v[1]) * inverse, ((one + g.xx) * v[1] - g.yx * v[0]) * inverse};
     }
 
     template <class Lanes>
-    static Gradient<Pack> gradient(const LpfdmGrid& grid, std::size_t first_cell, const Lanes& lanes, Pack cx, Pack cy)
+    TESTBED_INLINE static Gradient<Pack> gradient(const LpfdmGrid& grid, std::size_t first_cell, const Lanes& lanes, Pack cx, Pack cy)
     {
         const Pack one(1.0);
         Gradient<Pack> mean{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};

@@ -220,7 +220,6 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, d
                  {
                      const BinFrame frame(grid.lattice, bins[b]);
                      const BinMotion<Support> motion(grid, bins[b]);
-                     bool left = false;
                      for_each_pack(bins[b].begin, bins[b].end,
                                    [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                                    {
@@ -232,10 +231,8 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, d
                                        stretch<Support>(q, p, lanes, d);
                                        lanes.store(&q.x[p], x);
                                        lanes.store(&q.y[p], y);
-                                       left |= frame.left<Support>(q, p, lanes, frame.corner<Support>(q, p, lanes, x, y));
                                    });
-                     sum_bin<Support, CellSums<Support>>(grid.lattice, body, bins[b], sums + b * CellSums<Support>::numbers);
-                     if (left)
+                     if (sum_bin<Support, CellSums<Support>>(grid.lattice, body, bins[b], sums + b * CellSums<Support>::numbers))
                      {
                          sorted.mark(b);
                          moved.store(true, std::memory_order_relaxed);

@@ -370,12 +370,11 @@ private:
                                   const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
                                   lanes.store(&q.x[p], x);
                                   lanes.store(&q.y[p], y);
-                                  left |= frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x, y));
-                                  if constexpr (reaches_beyond)
-                                      left |= lanes.any(outside(x, y));
+                                  if constexpr (!with_stress)
+                                      left |= stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x, y)));
                               });
                 if constexpr (with_stress)
-                    sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number));
+                    left |= sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number));
                 if (left)
                 {
                     body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
@@ -383,12 +382,6 @@ private:
                 }
             });
         moved_ = moved;
-    }
-    /// Whether points left the lattice: with shapes that begin half a cell from the point they do so in the middle of a bin.
-    Mask outside(Pack x, Pack y) const
-    {
-        const Vec2 &low = lattice_.origin, high{low[0] + lattice_.nx * lattice_.cell_size, low[1] + lattice_.ny * lattice_.cell_size};
-        return !(x >= Pack(low[0]) && x < Pack(high[0]) && y >= Pack(low[1]) && y < Pack(high[1]));
     }
 
     Lattice lattice_;
