@@ -9,10 +9,19 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
 namespace testbed
 {
+/// A node by its column and line, whatever its number; ordered as nodes are numbered, line by line.
+struct NodeIndex
+{
+    int i, j;
+    bool operator==(const NodeIndex&) const = default;
+    friend auto operator<=>(const NodeIndex& a, const NodeIndex& b) { return std::tie(a.j, a.i) <=> std::tie(b.j, b.i); }
+};
+
 struct Lattice
 {
     Vec2 origin{0, 0};
@@ -29,7 +38,8 @@ struct Lattice
     int cell_j(std::size_t c) const { return static_cast<int>(c / cell_stride()) - 2; }
     int node_i(std::size_t n) const { return static_cast<int>(n % node_stride()) - 1; }
     int node_j(std::size_t n) const { return static_cast<int>(n / node_stride()) - 1; }
-    Vec2 node_position(std::size_t n) const { return {origin[0] + node_i(n) * cell_size, origin[1] + node_j(n) * cell_size}; }
+    Vec2 node_position(const NodeIndex& n) const { return {origin[0] + n.i * cell_size, origin[1] + n.j * cell_size}; }
+    Vec2 node_position(std::size_t n) const { return node_position(NodeIndex{node_i(n), node_j(n)}); }
 };
 
 /// Consecutive numbers of cells or nodes, for loops without an index per entity.
@@ -79,7 +89,7 @@ public:
     template <class Kernel>
     void for_each(Kernel&& kernel) const
     {
-        for_each_run(runs_, [&](const Run& run) { for_each_pack(run.begin, run.begin + run.count, kernel); });
+        for_each_run(runs_, [&](const Run& run) TESTBED_FLATTEN { for_each_pack(run.begin, run.begin + run.count, kernel); });
     }
     std::size_t bytes() const
     {

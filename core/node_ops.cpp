@@ -9,33 +9,34 @@ namespace
 Restraint make_boundary(const BoundarySpec& spec, const Scene& scene, const Lattice& lattice)
 {
     const Expression where(spec.where, scene.expression_constants());
-    Restraint restraint{spec.name, {}, {}};
-    for (std::size_t n = 0; n < lattice.nodes(); ++n)
-    {
-        const Vec2 x = lattice.node_position(n);
-        if (!holds_near(where, x[0], x[1], 1e-6 * lattice.cell_size))
-            continue;
-        if (spec.fix != "y")
-            restraint.x.nodes.push_back(static_cast<std::uint32_t>(n));
-        if (spec.fix != "x")
-            restraint.y.nodes.push_back(static_cast<std::uint32_t>(n));
-    }
-    if (restraint.x.empty() && restraint.y.empty())
+    Restraint restraint{spec.name, {}};
+    for (int j = -1; j <= lattice.ny + 1; ++j)
+        for (int i = -1; i <= lattice.nx + 1; ++i)
+        {
+            const Vec2 x = lattice.node_position({i, j});
+            if (!holds_near(where, x[0], x[1], 1e-6 * lattice.cell_size))
+                continue;
+            if (spec.fix != "y")
+                restraint.components[0].nodes.push_back({i, j});
+            if (spec.fix != "x")
+                restraint.components[1].nodes.push_back({i, j});
+        }
+    if (restraint.components[0].empty() && restraint.components[1].empty())
         throw SceneError(
             fmt::format("{}: boundary '{}': where = \"{}\" holds at no node of the lattice", scene.path, spec.name, spec.where));
     return restraint;
 }
 
 /// The restraint other than `own` that holds all of the nodes in the component in which they are driven, if there is one.
-const Restraint* in_the_way(const std::vector<std::uint32_t>& nodes, const Restraint& own, const std::vector<Restraint>& all)
+const Restraint* in_the_way(const std::vector<NodeIndex>& nodes, const Restraint& own, const std::vector<Restraint>& all)
 {
     const auto holds = [&](const ComponentRestraint& other, const ComponentRestraint& driven)
     {
-        const auto held = [&](std::uint32_t n) { return std::find(other.nodes.begin(), other.nodes.end(), n) != other.nodes.end(); };
+        const auto held = [&](const NodeIndex& n) { return std::binary_search(other.nodes.begin(), other.nodes.end(), n); };
         return driven.velocity != 0 && other.velocity != driven.velocity && std::all_of(nodes.begin(), nodes.end(), held);
     };
     for (const Restraint& other : all)
-        if (&other != &own && (holds(other.x, own.x) || holds(other.y, own.y)))
+        if (&other != &own && (holds(other.components[0], own.components[0]) || holds(other.components[1], own.components[1])))
             return &other;
     return nullptr;
 }
@@ -53,7 +54,7 @@ NodeOps::NodeOps(const Scene& scene, const Lattice& lattice)
     for (const WallSpec& spec : scene.walls)
     {
         walls_.emplace_back(spec, scene, lattice);
-        restraints_.push_back({spec.name, {}, {}});
+        restraints_.push_back({spec.name, {}});
     }
 }
 
@@ -72,31 +73,16 @@ void NodeOps::begin_step(double t, double dt)
     }
 }
 
-void NodeOps::apply_forces(Nodes& nodes, double t)
+void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, double t)
 {
     if (gravity_)
         gravity_->apply(nodes, t);
-    find_used(nodes);
-    bool has_pairs = false;
-    std::for_each(restraints_.rbegin(), restraints_.rend(),  // a node of two is driven by the later one
-                  [&](Restraint& r) {
-                      r.reaction = {r.x.react_at_nodes(nodes.fx), r.y.react_at_nodes(nodes.fy)};
-                  });
-    for (Restraint& r : restraints_)
-    {
-        r.reaction[0] += r.x.react_at_faces(nodes, nodes.fx);
-        r.reaction[1] += r.y.react_at_faces(nodes, nodes.fy);
-        has_pairs |= !r.x.pairs.empty() || !r.y.pairs.empty();
-    }
+    find_driven(lattice, nodes);
+    driven_.react(restraints_, nodes);
     if (!damping_)
         return;
     damping_->apply(nodes);
-    if (has_pairs)  // what damping puts on the nodes of a face must not move the wall
-        for (const Restraint& r : restraints_)
-        {
-            r.x.react_at_faces(nodes, nodes.fx);
-            r.y.react_at_faces(nodes, nodes.fy);
-        }
+    driven_.hold_faces(nodes);  // what damping puts on the nodes of a face must not move the wall
 }
 
 std::vector<RestraintRecord> NodeOps::records() const

@@ -89,29 +89,24 @@ public:
             wall.end_step(dt);
     }
     /// Gravity, the reactions of supports and walls, and damping of what is then out of balance.
-    void apply_forces(Nodes& nodes, double t);
+    void apply_forces(const Lattice& lattice, Nodes& nodes, double t);
     /// Supports and walls prescribe the velocity.
-    void restrain(const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy)
+    void restrain(const Lattice& lattice, const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy)
     {
-        find_used(nodes);
-        for (const Restraint& r : restraints_)
-            r.drive(nodes, vx, vy);
+        find_driven(lattice, nodes);
+        driven_.drive(restraints_, nodes, vx, vy);
     }
     bool restrains() const { return !restraints_.empty(); }
     std::vector<RestraintRecord> records() const;
     const std::vector<Restraint>& restraints() const { return restraints_; }
 
 private:
-    void find_used(const Nodes& nodes)
+    void find_driven(const Lattice& lattice, const Nodes& nodes)
     {
         if (nodes.version() == seen_)
             return;
         seen_ = nodes.version();
-        for (Restraint& r : restraints_)
-        {
-            r.x.use(nodes.active());
-            r.y.use(nodes.active());
-        }
+        driven_.find(restraints_, lattice, nodes);
     }
 
     std::optional<Gravity> gravity_;
@@ -119,7 +114,8 @@ private:
     std::vector<Restraint> restraints_;  ///< of the boundaries, then of the walls: where two prescribe, the later one does
     std::vector<Wall> walls_;
     std::size_t first_wall_ = 0;
-    std::size_t seen_ = 0;  ///< version of the nodes for which the restraints know which they use; 0: they do not
+    DrivenNodes driven_;
+    std::size_t seen_ = 0;  ///< version of the nodes for which driven_ was found; 0: none
 };
 
 /// Eqs. (12), (14): v += F / m dt.

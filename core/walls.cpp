@@ -35,8 +35,8 @@ bool Wall::begin_step(double t, double dt, Restraint& restraint)
         return others;
     const Vec2 v = (*velocity_)({.t = t + 0.5 * dt});
     travel_rate_ = v;
-    restraint.x.velocity = spec_.fix == "y" ? 0 : v[0];
-    restraint.y.velocity = spec_.fix == "x" ? 0 : v[1];
+    restraint.components[0].velocity = spec_.fix == "y" ? 0 : v[0];
+    restraint.components[1].velocity = spec_.fix == "x" ? 0 : v[1];
     return others;
 }
 
@@ -76,21 +76,22 @@ void Wall::take_nodes(const Region& region, Restraint& restraint)
     const double L = lattice_.cell_size;
     const auto first = [&](std::size_t k) { return static_cast<int>(std::ceil((region.min[k] - lattice_.origin[k]) / L - slack)); };
     const auto last = [&](std::size_t k) { return static_cast<int>(std::floor((region.max[k] - lattice_.origin[k]) / L + slack)); };
-    std::vector<std::uint32_t> nodes;
+    std::vector<NodeIndex> nodes;
     // a wall that ends at the edge of the lattice takes the ring around it, too
     const auto low = [&](std::size_t k) { return first(k) <= 0 ? -1 : first(k); };
     const auto high = [&](std::size_t k, int n) { return last(k) >= n ? n + 1 : last(k); };
     for (int j = low(1); j <= high(1, lattice_.ny); ++j)
         for (int i = low(0); i <= high(0, lattice_.nx); ++i)
-            if (const std::size_t n = lattice_.node(i, j); !is_open_at(region, lattice_.node_position(n)))
-                nodes.push_back(static_cast<std::uint32_t>(n));
+            if (!is_open_at(region, lattice_.node_position({i, j})))
+                nodes.push_back({i, j});
     if (taken_)
         std::set_difference(nodes.begin(), nodes.end(), covered_.begin(), covered_.end(), std::back_inserter(new_nodes_));
     covered_ = nodes;
-    for (ComponentRestraint* component : {&restraint.x, &restraint.y})
-        component->pairs.clear();
-    restraint.x.nodes = spec_.fix == "y" ? std::vector<std::uint32_t>{} : nodes;
-    restraint.y.nodes = spec_.fix == "x" ? std::vector<std::uint32_t>{} : std::move(nodes);
+    for (ComponentRestraint& component : restraint.components)
+    {
+        component.pairs.clear();
+        component.nodes = spec_.fix == (&component == &restraint.components[0] ? "y" : "x") ? std::vector<NodeIndex>{} : nodes;
+    }
 }
 
 /// Where a face lies between two lines of nodes, the pairs across it take the place of the nodes next to it.
@@ -116,27 +117,27 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
             for (int k = from; k <= to; ++k)
             {
                 const int line = static_cast<int>(below);
-                const auto low = normal == 0 ? lattice_.node(line, k) : lattice_.node(k, line);
-                const auto high = normal == 0 ? lattice_.node(line + 1, k) : lattice_.node(k, line + 1);
+                const NodeIndex low = normal == 0 ? NodeIndex{line, k} : NodeIndex{k, line};
+                const NodeIndex high = normal == 0 ? NodeIndex{line + 1, k} : NodeIndex{k, line + 1};
                 Vec2 place = lattice_.node_position(low);
                 place[normal] = face;
                 if (!is_open_at(region, place))
-                    pairs.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high), share});
+                    pairs.push_back({low, high, share});
             }
             if (is_plate)
                 break;
         }
     }
-    std::vector<std::uint32_t> at_faces;
+    std::vector<NodeIndex> at_faces;
     for (const FacePair& p : pairs)
         at_faces.insert(at_faces.end(), {p.low, p.high});
     std::sort(at_faces.begin(), at_faces.end());
-    for (ComponentRestraint* component : {&restraint.x, &restraint.y})
+    for (ComponentRestraint& component : restraint.components)
     {
-        if (spec_.fix == (component == &restraint.x ? "y" : "x"))
+        if (spec_.fix == (&component == &restraint.components[0] ? "y" : "x"))
             continue;
-        component->pairs = pairs;
-        std::erase_if(component->nodes, [&](std::uint32_t n) { return std::binary_search(at_faces.begin(), at_faces.end(), n); });
+        component.pairs = pairs;
+        std::erase_if(component.nodes, [&](const NodeIndex& n) { return std::binary_search(at_faces.begin(), at_faces.end(), n); });
     }
 }
 

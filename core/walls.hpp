@@ -21,7 +21,7 @@ public:
     /// Since the start [m].
     const Vec2& displacement() const { return travel_; }
     /// Nodes that the last begin_step() added; not those of the start.
-    const std::vector<std::uint32_t>& new_nodes() const { return new_nodes_; }
+    const std::vector<NodeIndex>& new_nodes() const { return new_nodes_; }
 
 private:
     struct Region
@@ -41,7 +41,7 @@ private:
     std::optional<VectorExpression> velocity_;
     Vec2 travel_{0, 0}, travel_rate_{0, 0};
     std::optional<Region> taken_;
-    std::vector<std::uint32_t> covered_, new_nodes_;
+    std::vector<NodeIndex> covered_, new_nodes_;
 };
 
 /// The coordinate along which a wall's door opens: that of its longer side.

@@ -81,7 +81,7 @@ struct LpfdmGrid
     void for_each_cell(Kernel&& kernel) const
     {
         for_each_run(cell_runs_,
-                     [&](const Run& run)
+                     [&](const Run& run) TESTBED_FLATTEN
                      {
                          const std::size_t n = first_node(run.begin);
                          for_each_pack(0, run.count, [&](std::size_t k, const auto& lanes) { kernel(run.begin + k, n + k, lanes); });
@@ -92,7 +92,7 @@ struct LpfdmGrid
     void for_each_node(Kernel&& kernel) const
     {
         for_each_run(node_runs_,
-                     [&](const Run& run)
+                     [&](const Run& run) TESTBED_FLATTEN
                      {
                          const std::size_t c = first_cell(run.begin);
                          for_each_pack(0, run.count, [&](std::size_t k, const auto& lanes) { kernel(run.begin + k, c + k, lanes); });

@@ -66,7 +66,7 @@ public:
                {
                    extend_to_frontier();
                    convect_velocity(dt);
-                   node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
+                   node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         if (!hourglass_x_.empty())
             timer_("hourglass", [&]
@@ -79,7 +79,7 @@ public:
                        add_body_force(t);
                    if (tractions_)
                        tractions_->apply(grid_.lattice, bodies_, nodes_, t);
-                   node_ops_.apply_forces(nodes_, t);
+                   node_ops_.apply_forces(grid_.lattice, nodes_, t);
                });
         lag_ = started_ ? 0.5 * dt : 0;
     }
@@ -91,10 +91,15 @@ public:
                [&]
                {
                    accelerate(nodes_, started_ ? dt : 0.5 * dt);
-                   node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
+                   node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         started_ = true;
-        timer_("cell strain (5)", [&] { cell_gradients(grid_, dt); });
+        timer_("cell strain (5)",
+               [&]
+               {
+                   cell_gradients(grid_, dt);
+                   gradients_over_ = dt;
+               });
         timer_("points (6), material",
                [&]
                {
@@ -160,7 +165,11 @@ private:
             bins.push_back(&body.bins);
         }
         if (other_bins)
+        {
             left_ = grid_.rebuild<S>(bins);
+            gradients_over_ = 0;
+            was_rebuilt_ = true;
+        }
         sums_.update(grid_.lattice, bodies_);
         moved_ = false;
     }
@@ -169,8 +178,9 @@ private:
     /// active before (or start from zero, as printed); nodes that it left are cleared.
     void extend_to_frontier()
     {
-        if (left_.empty() && !frontier_moved())
+        if (!std::exchange(was_rebuilt_, false) && (S == 1 || !frontier_moved()))  // a cell of points alone has mass while it is in use
             return;
+        gradients_over_ = 0;
         std::vector<std::pair<std::uint32_t, Vec2>> reached;
         for (const auto n : nodes_.active())
             if (nodes_.mass[n] > 0 && !was_active_[n])
@@ -241,7 +251,8 @@ private:
     {
         if (options_.convection == "none" || !started_)
             return;
-        cell_gradients(grid_, dt);
+        if (gradients_over_ != dt)
+            cell_gradients(grid_, dt);
         if (options_.convection == "upwind")
             convect<UpwindConvection>(grid_, dt);
         else
@@ -310,7 +321,8 @@ private:
     std::optional<NonlocalStrain> nonlocal_;
     PhaseTimer timer_;
     double wave_speed_ = 0, internal_ = 0, lag_ = 0;
-    bool moved_ = false, started_ = false;
+    double gradients_over_ = 0;  ///< the step over which the cells hold the gradients of the present velocity; 0: none
+    bool moved_ = false, was_rebuilt_ = true, started_ = false;
 };
 }  // namespace
 

@@ -82,7 +82,7 @@ public:
                    fold_forces();
                    if (tractions_)
                        tractions_->apply(lattice_, bodies_, nodes_, t);
-                   node_ops_.apply_forces(nodes_, t);
+                   node_ops_.apply_forces(lattice_, nodes_, t);
                });
         lag_ = started_ ? 0.5 * dt : 0;
     }
@@ -99,15 +99,9 @@ public:
             timer_("remap velocity",
                    [&]
                    {
-                       carrier_x_.resize(nodes_.vx.size());
-                       carrier_y_.resize(nodes_.vy.size());
-                       for (const auto n : nodes_.active())
-                       {
-                           carrier_x_[n] = nodes_.vx[n];
-                           carrier_y_[n] = nodes_.vy[n];
-                       }
+                       keep_velocity(carrier_x_, carrier_y_);
                        to_nodes<Scatter::momentum>(workspace_);
-                       node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
+                       node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy);
                        extend(nodes_.vx, nodes_.vy);
                    });
             timer_("points, material", [&] { move_points<true>(carrier_x_, carrier_y_, dt); });
@@ -240,31 +234,44 @@ private:
     {
         if (!node_ops_.restrains())
             return extend(nodes_.vx, nodes_.vy);
-        mapped_x_.resize(nodes_.vx.size());
-        mapped_y_.resize(nodes_.vy.size());
-        for (const auto n : nodes_.active())
-        {
-            mapped_x_[n] = nodes_.vx[n];
-            mapped_y_[n] = nodes_.vy[n];
-        }
-        node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
+        keep_velocity(mapped_x_, mapped_y_);
+        node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy);
         extend(nodes_.vx, nodes_.vy);
+    }
+
+    /// Copies the velocity of the nodes in use.
+    void keep_velocity(std::vector<double>& x, std::vector<double>& y)
+    {
+        x.resize(nodes_.vx.size());
+        y.resize(nodes_.vy.size());
+        nodes_.for_each(
+            [&](std::size_t i, const auto& lanes)
+            {
+                lanes.store(&x[i], lanes.load(&nodes_.vx[i]));
+                lanes.store(&y[i], lanes.load(&nodes_.vy[i]));
+            });
     }
 
     /// v += F / m dt; from here on the force holds the increment of the velocity.
     void accelerate_and_keep_increment(double dt)
     {
         accelerate(nodes_, dt);
-        node_ops_.restrain(nodes_, nodes_.vx, nodes_.vy);
-        const bool restrained = node_ops_.restrains();
-        parallel_for(nodes_.active().size(),
-                     [&](std::size_t a)
-                     {
-                         const std::size_t i = nodes_.active()[a];
-                         const double step = inverse_mass(nodes_, i) * dt;
-                         nodes_.fx[i] = restrained ? nodes_.vx[i] - mapped_x_[i] : nodes_.fx[i] * step;
-                         nodes_.fy[i] = restrained ? nodes_.vy[i] - mapped_y_[i] : nodes_.fy[i] * step;
-                     });
+        node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy);
+        if (node_ops_.restrains())
+            nodes_.for_each(
+                [&](std::size_t i, const auto& lanes)
+                {
+                    lanes.store(&nodes_.fx[i], lanes.load(&nodes_.vx[i]) - lanes.load(&mapped_x_[i]));
+                    lanes.store(&nodes_.fy[i], lanes.load(&nodes_.vy[i]) - lanes.load(&mapped_y_[i]));
+                });
+        else
+            nodes_.for_each(
+                [&](std::size_t i, const auto& lanes)
+                {
+                    const Pack step = inverse_mass(nodes_, i, lanes) * Pack(dt);
+                    lanes.store(&nodes_.fx[i], lanes.load(&nodes_.fx[i]) * step);
+                    lanes.store(&nodes_.fy[i], lanes.load(&nodes_.fy[i]) * step);
+                });
         extend(nodes_.vx, nodes_.vy);
         extend(nodes_.fx, nodes_.fy);
     }

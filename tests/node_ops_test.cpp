@@ -90,7 +90,7 @@ fix = "x"
     std::vector<std::uint32_t> all(lattice.nodes() - 1);  // but the last one
     std::iota(all.begin(), all.end(), 0u);
     nodes.set_active(all);
-    ops.restrain(nodes, vx, vy);
+    ops.restrain(lattice, nodes, vx, vy);
     EXPECT_EQ(vy[lattice.node(3, 0)], 0);
     EXPECT_EQ(vx[lattice.node(0, 3)], 0);
     EXPECT_EQ(vy[lattice.node(0, 3)], 1);
@@ -98,7 +98,7 @@ fix = "x"
     EXPECT_EQ(vx[lattice.node(-1, 3)], 0);  // the ring around the lattice, too
     nodes.set_active({});
     std::fill(vy.begin(), vy.end(), 1.0);
-    ops.restrain(nodes, vx, vy);
+    ops.restrain(lattice, nodes, vx, vy);
     EXPECT_EQ(vy[lattice.node(3, 0)], 1);  // a node that is not in use costs nothing
 }
 

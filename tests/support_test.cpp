@@ -125,7 +125,8 @@ TEST(BinFrame, SeesWhoLeft)
         Corner c{Pack(0.5), Pack(0.5), Pack(0.4), Pack(0.4)};
         c.ax[pack_size - 1] = ax;
         c.ay[pack_size - 1] = ay;
-        const bool point = frame.left<PointSupport>(q, 0, AllLanes{}, c), box = frame.left<DomainSupport>(q, 0, AllLanes{}, c);
+        const bool point = stdx::any_of(frame.left<PointSupport>(q, 0, AllLanes{}, c)),
+                   box = stdx::any_of(frame.left<DomainSupport>(q, 0, AllLanes{}, c));
         EXPECT_EQ(point, box);
         return point;
     };
@@ -145,18 +146,18 @@ TEST(BinFrame, SeesWhoLeft)
         {
             reset();
             (*field)[0] = bad;
-            EXPECT_TRUE(frame.left<DomainSupport>(q, 0, AllLanes{}, inside)) << bad;
+            EXPECT_TRUE(stdx::any_of(frame.left<DomainSupport>(q, 0, AllLanes{}, inside))) << bad;
         }
         reset();
         q.volume[0] = bad;
-        EXPECT_TRUE(frame.left<PointSupport>(q, 0, AllLanes{}, inside)) << bad;
+        EXPECT_TRUE(stdx::any_of(frame.left<PointSupport>(q, 0, AllLanes{}, inside))) << bad;
     }
     reset();
     Corner behind = inside;
     if (pack_size > 1)
     {
         behind.ax[pack_size - 1] = nan;
-        EXPECT_FALSE(frame.left<PointSupport>(q, 0, SomeLanes{pack_size - 1}, behind));
-        EXPECT_TRUE(frame.left<PointSupport>(q, 0, AllLanes{}, behind));
+        EXPECT_FALSE(stdx::any_of(frame.left<PointSupport>(q, 0, SomeLanes{pack_size - 1}, behind)));
+        EXPECT_TRUE(stdx::any_of(frame.left<PointSupport>(q, 0, AllLanes{}, behind)));
     }
 }

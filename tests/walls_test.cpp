@@ -43,7 +43,7 @@ struct Fixture
     std::vector<double> column(int i)
     {
         std::vector<double> vx(nodes.vx.size(), 1), vy(nodes.vy.size(), 1);
-        ops.restrain(nodes, vx, vy);
+        ops.restrain(lattice, nodes, vx, vy);
         std::vector<double> values;
         for (int j = 0; j <= lattice.ny; ++j)
             values.push_back(vy[lattice.node(i, j)]);
@@ -91,7 +91,7 @@ TEST(Wall, ReactionHoldsTheFace)
     f.nodes.fy[low] = -5;
     f.nodes.fy[high] = -7;
     f.nodes.fx[low] = 4;
-    f.ops.apply_forces(f.nodes, 0);
+    f.ops.apply_forces(f.lattice, f.nodes, 0);
     EXPECT_NEAR(0.6 * f.nodes.fy[low] / 3 + 0.4 * f.nodes.fy[high] / 2, 0, 1e-12);
     EXPECT_NEAR(f.ops.records()[0].reaction[1], f.nodes.fy[low] + f.nodes.fy[high] + 12, 1e-12);
     EXPECT_GT(f.ops.records()[0].reaction[1], 0);
@@ -109,7 +109,7 @@ TEST(Wall, ReactionBeforeDamping)
     f.nodes.fx[n] = 2;
     f.nodes.vy[n] = f.nodes.vy[free] = 1;
     f.nodes.fy[free] = 10;
-    f.ops.apply_forces(f.nodes, 0);
+    f.ops.apply_forces(f.lattice, f.nodes, 0);
     EXPECT_EQ(f.ops.records()[0].reaction, (Vec2{-2, 5}));
     EXPECT_EQ(f.nodes.fy[n], 0);
     EXPECT_DOUBLE_EQ(f.nodes.fy[free], 2);
@@ -128,7 +128,7 @@ TEST(Wall, DampingDoesNotMoveTheFace)
     f.nodes.fy[high] = -7;
     f.nodes.vy[low] = 0.4;
     f.nodes.vy[high] = -0.6;  // at rest at the face, y = 0.2
-    f.ops.apply_forces(f.nodes, 0);
+    f.ops.apply_forces(f.lattice, f.nodes, 0);
     EXPECT_NEAR(0.6 * f.nodes.fy[low] / 3 + 0.4 * f.nodes.fy[high] / 2, 0, 1e-12);
     EXPECT_GT(std::abs(f.nodes.fy[low]), 1e-3);  // the pair may still turn about the face
 }
@@ -171,7 +171,7 @@ TEST(Wall, OwnsWhatItDrives)
     const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 6));
     f.nodes.set_active({n});
     f.nodes.fy[n] = 5;
-    f.ops.apply_forces(f.nodes, 0);
+    f.ops.apply_forces(f.lattice, f.nodes, 0);
     EXPECT_EQ(f.ops.records()[0].reaction[1], 0);
     EXPECT_EQ(f.ops.records()[1].reaction[1], -5);
     EXPECT_EQ(f.column(3)[6], -2);
@@ -192,7 +192,7 @@ TEST(Wall, DoorOpensWhenToldTo)
     const auto row = [&]
     {
         std::vector<double> vx(f.nodes.vx.size(), 1), vy(f.nodes.vy.size(), 1), values;
-        f.ops.restrain(f.nodes, vx, vy);
+        f.ops.restrain(f.lattice, f.nodes, vx, vy);
         for (int i = 0; i <= f.lattice.nx; ++i)
             values.push_back(vy[f.lattice.node(i, 0)]);
         return values;

@@ -1,0 +1,137 @@
+#include "core/restraint.hpp"
+
+#include <algorithm>
+#include <optional>
+
+namespace testbed
+{
+namespace
+{
+constexpr std::size_t worth_a_team = 64;
+
+/// What a face between two nodes gives to them to change its own velocity by dv. Without mass on both sides no soil lies at the face.
+std::array<double, 2> impulse(const Nodes& carrier, std::uint32_t low, std::uint32_t high, double share, double dv)
+{
+    if (!(carrier.mass[low] > 0 && carrier.mass[high] > 0))
+        return {0, 0};
+    const double a = 1 - share, b = share;
+    const double size = dv / (a * a / carrier.mass[low] + b * b / carrier.mass[high]);
+    return {a * size, b * size};
+}
+
+/// Adds the reaction at a face to the forces f; returns it [N/m].
+template <class Pair>
+double hold_face(const Nodes& carrier, const Pair& p, std::vector<double>& f)
+{
+    const double a = (1 - p.share) * f[p.low] * inverse_mass(carrier, p.low) + p.share * f[p.high] * inverse_mass(carrier, p.high);
+    const auto [low, high] = impulse(carrier, p.low, p.high, p.share, -a);
+    f[p.low] += low;
+    f[p.high] += high;
+    return low + high;
+}
+
+/// take(number) for the nodes of an ascending list that are in use.
+template <class Take>
+void for_each_used(const std::vector<NodeIndex>& ascending, const Lattice& lattice, const std::vector<std::uint32_t>& active, Take&& take)
+{
+    auto from = active.begin();
+    for (const NodeIndex& n : ascending)
+    {
+        const auto number = static_cast<std::uint32_t>(lattice.node(n.i, n.j));
+        from = std::lower_bound(from, active.end(), number);
+        if (from != active.end() && *from == number)
+            take(number);
+    }
+}
+}  // namespace
+
+void DrivenNodes::find(const std::vector<Restraint>& restraints, const Lattice& lattice, const Nodes& nodes)
+{
+    const auto& active = nodes.active();
+    const auto used = [&](const NodeIndex& n) -> std::optional<std::uint32_t>
+    {
+        const auto number = static_cast<std::uint32_t>(lattice.node(n.i, n.j));
+        return std::binary_search(active.begin(), active.end(), number) ? std::optional(number) : std::nullopt;
+    };
+    stages_.assign(1, {});
+    for (std::size_t r = 0; r < restraints.size(); ++r)
+    {
+        const auto restraint = static_cast<std::uint16_t>(r);
+        for (std::uint16_t k = 0; k < 2; ++k)
+        {
+            for_each_used(restraints[r].components[k].nodes, lattice, active,
+                          [&](std::uint32_t n) { stages_.back().nodes.push_back({n, restraint, k}); });
+            for (const FacePair& p : restraints[r].components[k].pairs)
+                if (const auto low = used(p.low), high = used(p.high); low && high)
+                    stages_.back().pairs.push_back({*low, *high, p.share, restraint, k});
+        }
+        if (!stages_.back().pairs.empty())
+            stages_.emplace_back();
+    }
+    for (Stage& stage : stages_)
+    {
+        const auto place = [](const Driven& d) { return std::pair(d.node, d.component); };
+        std::stable_sort(stage.nodes.begin(), stage.nodes.end(), [&](const Driven& a, const Driven& b) { return place(a) < place(b); });
+        const auto last = std::unique(stage.nodes.rbegin(), stage.nodes.rend(),
+                                      [&](const Driven& a, const Driven& b) { return place(a) == place(b); });
+        stage.nodes.erase(stage.nodes.begin(), last.base());
+    }
+}
+
+void DrivenNodes::drive(const std::vector<Restraint>& restraints, const Nodes& carrier, std::vector<double>& vx,
+                        std::vector<double>& vy) const
+{
+    const std::array<std::vector<double>*, 2> velocity{&vx, &vy};
+    for (const Stage& stage : stages_)
+    {
+        parallel_for(
+            stage.nodes.size(),
+            [&](std::size_t n)
+            {
+                const Driven& d = stage.nodes[n];
+                (*velocity[d.component])[d.node] = restraints[d.restraint].components[d.component].velocity;
+            },
+            worth_a_team);
+        for (const Pair& p : stage.pairs)
+        {
+            std::vector<double>& v = *velocity[p.component];
+            const double face = (1 - p.share) * v[p.low] + p.share * v[p.high];
+            const auto [low, high] =
+                impulse(carrier, p.low, p.high, p.share, restraints[p.restraint].components[p.component].velocity - face);
+            v[p.low] += low * inverse_mass(carrier, p.low);
+            v[p.high] += high * inverse_mass(carrier, p.high);
+        }
+    }
+}
+
+void DrivenNodes::react(std::vector<Restraint>& restraints, Nodes& nodes)
+{
+    const std::array<std::vector<double>*, 2> force{&nodes.fx, &nodes.fy};
+    for (Restraint& r : restraints)
+        r.reaction = {0, 0};
+    for (auto stage = stages_.rbegin(); stage != stages_.rend(); ++stage)  // a node of two is driven by the later one
+    {
+        taken_.resize(stage->nodes.size());
+        parallel_for(
+            stage->nodes.size(),
+            [&](std::size_t n)
+            {
+                const Driven& d = stage->nodes[n];
+                taken_[n] = std::exchange((*force[d.component])[d.node], 0.0);
+            },
+            worth_a_team);
+        for (std::size_t n = 0; n < stage->nodes.size(); ++n)
+            restraints[stage->nodes[n].restraint].reaction[stage->nodes[n].component] -= taken_[n];
+    }
+    for (const Stage& stage : stages_)
+        for (const Pair& p : stage.pairs)
+            restraints[p.restraint].reaction[p.component] += hold_face(nodes, p, *force[p.component]);
+}
+
+void DrivenNodes::hold_faces(Nodes& nodes) const
+{
+    for (const Stage& stage : stages_)
+        for (const Pair& p : stage.pairs)
+            hold_face(nodes, p, p.component == 0 ? nodes.fx : nodes.fy);
+}
+}  // namespace testbed
