@@ -36,7 +36,20 @@ public:
     double* of(std::size_t bin) { return &sums_[bin * numbers]; }
     const std::vector<double>& all() const { return sums_; }
 
-    /// Takes over the sums of bins that kept their points, and sums the others; all of them the first time.
+    /// Sums bins that points left or entered.
+    void update_changed(const Lattice& lattice, const std::vector<Body>& bodies)
+    {
+        std::size_t first = 0;
+        for (const Body& body : bodies)
+        {
+            const auto& changed = body.bins.changed();
+            parallel_for(
+                changed.size(), [&](std::size_t k) TESTBED_FLATTEN
+                { sum_bin<Support, Sums>(lattice, body, body.bins.list()[changed[k]], of(first + changed[k])); }, 64);
+            first += body.bins.list().size();
+        }
+    }
+    /// The same if the lists of bins are others than before: takes over the sums of bins that kept their points; none the first time.
     void update(const Lattice& lattice, const std::vector<Body>& bodies)
     {
         std::size_t bins = 0;

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace testbed
@@ -31,8 +32,10 @@ public:
 
     const std::vector<Bin>& list() const { return bins_; }
     /// The number that bin b had before the last rebuild() if the same points are in it, which then were not marked.
-    std::optional<std::uint32_t> unchanged(std::size_t b) const { return before_[b] == changed ? std::nullopt : std::optional(before_[b]); }
+    std::optional<std::uint32_t> unchanged(std::size_t b) const { return before_[b] == none ? std::nullopt : std::optional(before_[b]); }
     std::size_t size_before() const { return size_before_; }
+    /// The bins that are not unchanged, if the last rebuild() left the list as it was.
+    const std::vector<std::uint32_t>& changed() const { return changed_; }
 
     /// Notes that a point of bin number `b` may have left it. Different bins may be marked by different threads.
     void mark(std::size_t b) { marked_[b] = 1; }
@@ -44,132 +47,201 @@ public:
     template <class Support>
     bool rebuild(Points& points, std::vector<double>& workspace)
     {
-        std::vector<Bin> before = std::move(bins_);
-        const bool is_first = before.empty();
+        const bool is_first = bins_.empty();
+        size_before_ = bins_.size();
         if (is_first)
         {
-            before.push_back({0, 0, 0, static_cast<std::uint32_t>(points.count)});
+            bins_.push_back({0, 0, 0, static_cast<std::uint32_t>(points.count)});
+            slot_[lattice_.cell(0, 0)] = 0;
             marked_.assign(1, 1);
         }
-        bins_.clear();
-        count<Support>(points, before);
-        order(before.size());
-        arrange(before);
+        before_.resize(bins_.size());
+        std::iota(before_.begin(), before_.end(), 0u);
+        list_marked();
+        find_keys<Support>(points);
+        if (const auto lost = find_lost())
+        {
+            if (is_first)
+            {
+                slot_[lattice_.cell(0, 0)] = -1;
+                bins_.clear();
+            }
+            throw_left_lattice(points, *lost);
+        }
+        const bool has_new = insert_new();
+        exchange();
+        const bool has_lost = erase_empty();
         marked_.assign(bins_.size(), 0);
-        size_before_ = is_first ? 0 : before.size();
         if (!moves_.empty())
         {
             make_room(workspace, points.count);
             points.for_each_field([&](auto& field) { field.reorder(moves_, workspace.data()); });
         }
-        return is_first || !std::equal(before.begin(), before.end(), bins_.begin(), bins_.end(),
-                                       [](const Bin& a, const Bin& b) { return a.i == b.i && a.j == b.j; });
+        return is_first || has_new || has_lost;
     }
 
     std::size_t bytes() const
     {
-        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + key_.capacity() * sizeof(std::uint32_t) +
-               moves_.capacity() * sizeof(Move) + marked_.capacity() + before_.capacity() * sizeof(std::uint32_t);
+        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + moves_.capacity() * sizeof(Move) +
+               marked_.capacity() +
+               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity()) * sizeof(std::uint32_t);
     }
 
 private:
-    static constexpr std::uint32_t outside = ~std::uint32_t{0}, changed = outside;
+    static constexpr std::uint32_t none = ~std::uint32_t{0};
 
-    /// Counts the points of each bin and lists the bins: first those of before, then new ones.
+    void list_marked()
+    {
+        marks_.clear();
+        for (auto m = std::find(marked_.begin(), marked_.end(), 1); m != marked_.end(); m = std::find(m + 1, marked_.end(), 1))
+            marks_.push_back(static_cast<std::uint32_t>(m - marked_.begin()));
+    }
     template <class Support>
-    void count(const Points& points, const std::vector<Bin>& before)
+    void find_keys(const Points& points)
     {
         key_.resize(points.count);
-        parallel_for(before.size(),
-                     [&](std::size_t b)
+        parallel_for(marks_.size(),
+                     [&](std::size_t m)
                      {
-                         if (marked_[b])
-                             for (std::size_t p = before[b].begin; p < before[b].end; ++p)
-                                 key_[p] = key<Support>(points, p);
+                         for (std::size_t p = bins_[marks_[m]].begin; p < bins_[marks_[m]].end; ++p)
+                             key_[p] = key<Support>(points, p);
                      });
-        const auto add = [&](std::size_t cell, std::uint32_t n)
-        {
-            std::int32_t& slot = slot_[cell];
-            if (slot < 0)
-            {
-                slot = static_cast<std::int32_t>(bins_.size());
-                bins_.push_back({lattice_.cell_i(cell), lattice_.cell_j(cell), 0, 0});
-            }
-            bins_[static_cast<std::size_t>(slot)].end += n;
-        };
-        for (const Bin& b : before)
-        {
-            slot_[lattice_.cell(b.i, b.j)] = -1;
-            add(lattice_.cell(b.i, b.j), 0);
-        }
-        for (std::size_t b = 0; b < before.size(); ++b)
-            if (!marked_[b])
-                add(lattice_.cell(before[b].i, before[b].j), before[b].end - before[b].begin);
-            else
-                for (std::size_t p = before[b].begin; p < before[b].end; ++p)
-                {
-                    if (key_[p] == outside)
-                    {
-                        for (const Bin& met : bins_)
-                            slot_[lattice_.cell(met.i, met.j)] = -1;
-                        bins_.clear();
-                        throw_left_lattice(points, p);
-                    }
-                    add(key_[p], 1);
-                }
     }
-
-    /// Bins in the order of their cells, with the place where the points of each begin. The first `sorted` are in order already.
-    void order(std::size_t sorted)
+    /// f(bin number, point) for the points of marked bins.
+    template <class F>
+    void for_each_marked(F&& f)
     {
-        const auto by_cell = [&](const Bin& a, const Bin& b) { return lattice_.cell(a.i, a.j) < lattice_.cell(b.i, b.j); };
-        const auto middle = bins_.begin() + static_cast<std::ptrdiff_t>(sorted);
-        std::sort(middle, bins_.end(), by_cell);
-        std::inplace_merge(bins_.begin(), middle, bins_.end(), by_cell);
-        std::erase_if(bins_,
-                      [&](const Bin& b)
-                      {
-                          if (b.end == 0)
-                              slot_[lattice_.cell(b.i, b.j)] = -1;
-                          return b.end == 0;
-                      });
-        std::uint32_t begin = 0;
-        for (std::size_t b = 0; b < bins_.size(); ++b)
-        {
-            const std::uint32_t n = bins_[b].end;
-            bins_[b].begin = bins_[b].end = begin;
-            begin += n;
-            slot_[lattice_.cell(bins_[b].i, bins_[b].j)] = static_cast<std::int32_t>(b);
-        }
+        for (const auto b : marks_)
+            for (std::uint32_t p = bins_[b].begin; p < bins_[b].end; ++p)
+                f(b, p);
+    }
+    std::optional<std::size_t> find_lost()
+    {
+        std::optional<std::size_t> lost;
+        for_each_marked(
+            [&](std::uint32_t, std::uint32_t p)
+            {
+                if (key_[p] == none && !lost)
+                    lost = p;
+            });
+        return lost;
     }
 
-    /// The blocks of points that move, neighbours with the same way taken together.
-    void arrange(const std::vector<Bin>& before)
+    /// Empty bins for the points that have none yet, in the order of cells.
+    bool insert_new()
+    {
+        std::vector<std::uint32_t> cells;
+        for_each_marked(
+            [&](std::uint32_t, std::uint32_t p)
+            {
+                if (slot_[key_[p]] < 0)
+                {
+                    slot_[key_[p]] = 0;
+                    cells.push_back(key_[p]);
+                }
+            });
+        if (cells.empty())
+            return false;
+        std::sort(cells.begin(), cells.end());
+        const std::vector<Bin> old = std::exchange(bins_, {});
+        const std::vector<char> old_marked = std::exchange(marked_, {});
+        before_.clear();
+        const auto add = [&](const Bin& bin, char is_marked, std::uint32_t number)
+        {
+            slot_[lattice_.cell(bin.i, bin.j)] = static_cast<std::int32_t>(bins_.size());
+            bins_.push_back(bin);
+            marked_.push_back(is_marked);
+            before_.push_back(number);
+        };
+        auto cell = cells.begin();
+        const auto add_up_to = [&](std::size_t end, std::uint32_t place)
+        {
+            for (; cell != cells.end() && *cell < end; ++cell)
+                add({lattice_.cell_i(*cell), lattice_.cell_j(*cell), place, place}, 0, none);
+        };
+        for (std::uint32_t b = 0; b < old.size(); ++b)
+        {
+            add_up_to(lattice_.cell(old[b].i, old[b].j), old[b].begin);
+            add(old[b], old_marked[b], b);
+        }
+        add_up_to(none, old.back().end);
+        list_marked();
+        return true;
+    }
+
+    /// Finds how points go to their bins: the blocks that move, neighbours with the same way taken together. All bins between the first
+    /// and the last that wins or loses points may shift.
+    void exchange()
     {
         moves_.clear();
-        before_.assign(bins_.size(), changed);
-        for (std::uint32_t b = 0; b < before.size(); ++b)
-            if (!marked_[b])
-                before_[static_cast<std::size_t>(slot_[lattice_.cell(before[b].i, before[b].j)])] = b;
-        const auto move = [&](std::uint32_t from, std::size_t cell, std::uint32_t n)
+        changed_.clear();
+        std::uint32_t first = none, last = 0;
+        const auto touch = [&](std::uint32_t b)
         {
-            std::uint32_t& to = bins_[static_cast<std::size_t>(slot_[cell])].end;
+            first = std::min(first, b);
+            last = std::max(last, b);
+            if (std::exchange(before_[b], none) != none)
+                changed_.push_back(b);
+        };
+        next_.resize(bins_.size());
+        for (const auto b : marks_)
+            touch(b);
+        for_each_marked([&](std::uint32_t, std::uint32_t p) { touch(slot(p)); });
+        if (first == none)
+            return;
+        for (std::uint32_t b = first; b <= last; ++b)
+            next_[b] = bins_[b].end - bins_[b].begin;
+        for_each_marked(
+            [&](std::uint32_t b, std::uint32_t p)
+            {
+                --next_[b];
+                ++next_[slot(p)];
+            });
+        std::exclusive_scan(next_.begin() + first, next_.begin() + last + 1, next_.begin() + first, bins_[first].begin);
+        const auto move = [&](std::uint32_t from, std::uint32_t bin, std::uint32_t n)
+        {
+            std::uint32_t& to = next_[bin];
             if (!moves_.empty() && moves_.back().from + moves_.back().count == from && moves_.back().to + moves_.back().count == to)
                 moves_.back().count += n;
             else if (from != to)
                 moves_.push_back({from, to, n});
             to += n;
         };
-        for (std::size_t b = 0; b < before.size(); ++b)
+        const std::uint32_t begin = bins_[first].begin;
+        for (std::uint32_t b = first; b <= last; ++b)
             if (!marked_[b])
-                move(before[b].begin, lattice_.cell(before[b].i, before[b].j), before[b].end - before[b].begin);
+                move(bins_[b].begin, b, bins_[b].end - bins_[b].begin);
             else
-                for (std::uint32_t p = before[b].begin; p < before[b].end; ++p)
-                {
-                    before_[static_cast<std::size_t>(slot_[key_[p]])] = changed;
-                    move(p, key_[p], 1);
-                }
+                for (std::uint32_t p = bins_[b].begin; p < bins_[b].end; ++p)
+                    move(p, slot(p), 1);
+        for (std::uint32_t b = first; b <= last; ++b)  // each has been filled up to the next
+        {
+            bins_[b].begin = b == first ? begin : bins_[b - 1].end;
+            bins_[b].end = next_[b];
+        }
     }
+
+    bool erase_empty()
+    {
+        if (std::none_of(marks_.begin(), marks_.end(), [&](std::uint32_t b) { return bins_[b].begin == bins_[b].end; }))
+            return false;
+        std::size_t kept = 0;
+        for (std::size_t b = 0; b < bins_.size(); ++b)
+        {
+            const bool is_empty = bins_[b].begin == bins_[b].end;
+            slot_[lattice_.cell(bins_[b].i, bins_[b].j)] = is_empty ? -1 : static_cast<std::int32_t>(kept);
+            if (is_empty)
+                continue;
+            bins_[kept] = bins_[b];
+            before_[kept++] = before_[b];
+        }
+        bins_.resize(kept);
+        before_.resize(kept);
+        return true;
+    }
+
+    /// Number of the bin to which a point of a marked bin goes.
+    std::uint32_t slot(std::uint32_t p) const { return static_cast<std::uint32_t>(slot_[key_[p]]); }
 
     template <class Support>
     std::uint32_t key(const Points& points, std::size_t p) const
@@ -178,14 +250,14 @@ private:
         const double cx = (points.x[p] - lattice_.origin[0]) / L, cy = (points.y[p] - lattice_.origin[1]) / L;
         const bool inside = cx >= 0 && cx < lattice_.nx && cy >= 0 && cy < lattice_.ny;  // false for NaN
         if (!inside)
-            return outside;
+            return none;
         if constexpr (!Support::has_box)
             if (points.volume.active() && !(points.volume[p] > 0))
-                return outside;
+                return none;
         if constexpr (Support::has_box)
         {
             if (!(points.half_x[p] > 0 && points.half_y[p] > 0))
-                return outside;
+                return none;
             const double hx = std::min(points.half_x[p] / L, 0.5), hy = std::min(points.half_y[p] / L, 0.5);
             return static_cast<std::uint32_t>(lattice_.cell(static_cast<int>(std::floor(cx - hx + bin_tolerance)),
                                                             static_cast<int>(std::floor(cy - hy + bin_tolerance))));
@@ -202,11 +274,14 @@ private:
 
     Lattice lattice_;
     std::vector<Bin> bins_;
-    std::vector<std::int32_t> slot_;
-    std::vector<std::uint32_t> key_;  ///< cell of each point of a marked bin
-    std::vector<Move> moves_;
+    std::vector<std::int32_t> slot_;  ///< number of the bin of each cell, or -1
     std::vector<char> marked_;
-    std::vector<std::uint32_t> before_;  ///< number of each bin before the last rebuild, or `changed`
+    std::vector<std::uint32_t> marks_;   ///< numbers of the marked bins
+    std::vector<std::uint32_t> key_;     ///< cell of each point of a marked bin
+    std::vector<std::uint32_t> before_;  ///< number of each bin before the last rebuild if it is unchanged, or `none`
+    std::vector<std::uint32_t> changed_;
+    std::vector<std::uint32_t> next_;  ///< where the next point of each bin goes
+    std::vector<Move> moves_;
     std::size_t size_before_ = 0;
 };
 

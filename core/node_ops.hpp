@@ -146,7 +146,7 @@ inline double force_norm(const Nodes& nodes)
                           });
             return std::array<double, 1>{sum(square)};
         },
-        32);
+        4);
     return std::sqrt(s[0]);
 }
 

@@ -169,8 +169,10 @@ private:
             left_ = grid_.rebuild<S>(bins);
             gradients_over_ = 0;
             was_rebuilt_ = true;
+            sums_.update(grid_.lattice, bodies_);
         }
-        sums_.update(grid_.lattice, bodies_);
+        else
+            sums_.update_changed(grid_.lattice, bodies_);
         moved_ = false;
     }
 

@@ -158,7 +158,7 @@ private:
                 edges_.rebuild(lattice_, nodes_.active());
         }
         if (options_.scheme != "usf")
-            sums_.update(lattice_, bodies_);
+            other_bins ? sums_.update(lattice_, bodies_) : sums_.update_changed(lattice_, bodies_);
         moved_ = false;
     }
 
