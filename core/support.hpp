@@ -47,6 +47,13 @@ struct Corner
     Pack ax, ay, wx, wy;
 };
 
+/// 1 over both widths by one division: divisions cost as much as all else.
+TESTBED_INLINE inline std::array<Pack, 2> inverse_widths(const Corner& c)
+{
+    const Pack inverse = Pack(1.0) / (c.wx * c.wy);
+    return {inverse * c.wy, inverse * c.wx};
+}
+
 /// Weights in both directions.
 template <class Support>
 struct Weights
@@ -55,11 +62,11 @@ struct Weights
 
     TESTBED_INLINE explicit Weights(const Corner& c)
     {
-        if constexpr (std::is_same_v<Support, DomainSupport>)
+        if constexpr (Support::has_box)
         {
-            const Pack inverse = Pack(1.0) / (c.wx * c.wy);  // divisions cost as much as all else
-            x = Support::weights_by(c.ax, c.wx, inverse * c.wy);
-            y = Support::weights_by(c.ay, c.wy, inverse * c.wx);
+            const auto inverse = inverse_widths(c);
+            x = Support::weights_by(c.ax, c.wx, inverse[0]);
+            y = Support::weights_by(c.ay, c.wy, inverse[1]);
         }
         else
         {

@@ -137,15 +137,20 @@ inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& 
         });
 }
 
-/// What is constant in a bin: the gradient of the increment averaged over a box, and the velocity of its (S+1) x (S+1) nodes.
+/// What is constant in a bin: the gradient of the increment averaged over a box, and the velocity of its (S+1) x (S+1) nodes, where it
+/// lies: copies would take registers that the loop over the points has no more.
 template <class Support>
 struct BinMotion
 {
     static constexpr int S = Support::S;
     std::array<Gradient<>, S * S> coefficients;  ///< of 1, a, b and a b, with the shares a and b of a box in the next cells
-    std::array<double, (S + 1) * (S + 1)> vx, vy;
+    const double *vx, *vy;  ///< of the bin's first node
+    std::size_t stride;
 
     TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin)
+        : vx(&grid.nodes.vx[grid.lattice.node(bin.i, bin.j)]),
+          vy(&grid.nodes.vy[grid.lattice.node(bin.i, bin.j)]),
+          stride(grid.lattice.node_stride())
     {
         const auto cell = [&](int i, int j) { return grid.cells.gradient(grid.lattice.cell(bin.i + i, bin.j + j)); };
         coefficients[0] = cell(0, 0);
@@ -155,13 +160,6 @@ struct BinMotion
             coefficients[2] = cell(0, 1) - cell(0, 0);
             coefficients[3] = cell(1, 1) - cell(1, 0) - coefficients[2];
         }
-        for (int j = 0; j <= S; ++j)
-            for (int i = 0; i <= S; ++i)
-            {
-                const std::size_t n = grid.lattice.node(bin.i + i, bin.j + j);
-                vx[j * (S + 1) + i] = grid.nodes.vx[n];
-                vy[j * (S + 1) + i] = grid.nodes.vy[n];
-            }
     }
     TESTBED_INLINE Gradient<Pack> gradient(const Corner& c) const
     {
@@ -185,8 +183,8 @@ struct BinMotion
             Pack rx(0.0), ry(0.0);
             for (int i = 0; i <= S; ++i)
             {
-                rx += wx[i] * Pack(vx[j * (S + 1) + i]);
-                ry += wx[i] * Pack(vy[j * (S + 1) + i]);
+                rx += wx[i] * Pack(vx[j * stride + i]);
+                ry += wx[i] * Pack(vy[j * stride + i]);
             }
             x += wy[j] * rx;
             y += wy[j] * ry;

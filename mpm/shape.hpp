@@ -35,14 +35,24 @@ struct GimpShape
     template <class T>
     TESTBED_INLINE static std::array<T, S> weights(T a, T width)
     {
+        return weights_by(a, width, T(1.0) / width);
+    }
+    template <class T>
+    TESTBED_INLINE static std::array<T, S> weights_by(T a, T width, T inverse)
+    {
         const T second = above(a + width - T(1.0), bin_tolerance), first = width - second;
-        const T low = first * (T(1.0) - a - T(0.5) * first) / width, high = T(0.5) * second * second / width;
+        const T low = first * (T(1.0) - a - T(0.5) * first) * inverse, high = T(0.5) * second * second * inverse;
         return {low, T(1.0) - low - high, high};
     }
     template <class T>
     TESTBED_INLINE static std::array<T, S> slopes(T a, T width)
     {
-        const T second = above(a + width - T(1.0), bin_tolerance) / width, first = T(1.0) - second;
+        return slopes_by(a, width, T(1.0) / width);
+    }
+    template <class T>
+    TESTBED_INLINE static std::array<T, S> slopes_by(T a, T width, T inverse)
+    {
+        const T second = above(a + width - T(1.0), bin_tolerance) * inverse, first = T(1.0) - second;
         return {-first, first - second, second};
     }
 };

@@ -18,11 +18,22 @@ struct ShapeAt
     std::array<Pack, S> wx, wy, gx, gy;
 
     TESTBED_INLINE ShapeAt(const Corner& c, double scale)
-        : wx(Shape::weights(c.ax, c.wx)),
-          wy(Shape::weights(c.ay, c.wy)),
-          gx(Shape::slopes(c.ax, c.wx)),
-          gy(Shape::slopes(c.ay, c.wy))
     {
+        if constexpr (Shape::has_box)
+        {
+            const auto inverse = inverse_widths(c);
+            wx = Shape::weights_by(c.ax, c.wx, inverse[0]);
+            wy = Shape::weights_by(c.ay, c.wy, inverse[1]);
+            gx = Shape::slopes_by(c.ax, c.wx, inverse[0]);
+            gy = Shape::slopes_by(c.ay, c.wy, inverse[1]);
+        }
+        else
+        {
+            wx = Shape::weights(c.ax, c.wx);
+            wy = Shape::weights(c.ay, c.wy);
+            gx = Shape::slopes(c.ax, c.wx);
+            gy = Shape::slopes(c.ay, c.wy);
+        }
         for (int k = 0; k < S; ++k)
         {
             gx[k] *= Pack(scale);
