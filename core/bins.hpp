@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -284,6 +285,25 @@ private:
     std::vector<Move> moves_;
     std::size_t size_before_ = 0;
 };
+
+/// The lattice with numbers for all that the S x S cells or nodes of bins touch. The same one if it has them already; else for a margin
+/// around them, too, so that points may go some way before it changes again: an empty part of the lattice takes no room.
+template <int S>
+Lattice with_numbers_for(const Lattice& lattice, std::span<const Bins* const> bins)
+{
+    CellBox reach{lattice.nx, lattice.ny, -1, -1};
+    for (const Bins* b : bins)
+        for (const Bin& bin : b->list())
+            reach = {std::min(reach.i0, bin.i), std::min(reach.j0, bin.j), std::max(reach.i1, bin.i + S), std::max(reach.j1, bin.j + S)};
+    const CellBox& has = lattice.numbered;  // the first ring may be reached, too
+    if (reach.i0 >= has.i0 - 1 && reach.j0 >= has.j0 - 1 && reach.i1 <= has.i1 + 1 && reach.j1 <= has.j1 + 1)
+        return lattice;
+    constexpr int margin = 16;
+    Lattice other = lattice;
+    other.numbered = {std::max(reach.i0 - margin, 0), std::max(reach.j0 - margin, 0), std::min(reach.i1 + margin, lattice.nx),
+                      std::min(reach.j1 + margin, lattice.ny)};
+    return other;
+}
 
 /// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), still does; false for NaN.
 template <class T>

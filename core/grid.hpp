@@ -1,12 +1,11 @@
 #pragma once
 /// The fixed square lattice. Cell (i, j) has its nodes [1] (i, j), [2] (i+1, j), [3] (i, j+1), [4] (i+1, j+1).
-/// One ring of cells around the lattice takes what a point's box spreads over its edge, and a second, always empty one lets
-/// every node of the first look at four cells: cells count from -2 and nodes from -1.
 
 #include "core/parallel.hpp"
 #include "core/simd.hpp"
 #include "core/types.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <tuple>
@@ -22,25 +21,69 @@ struct NodeIndex
     friend auto operator<=>(const NodeIndex& a, const NodeIndex& b) { return std::tie(a.j, a.i) <=> std::tie(b.j, b.i); }
 };
 
+/// Cells [i0, i1) x [j0, j1).
+struct CellBox
+{
+    int i0, j0, i1, j1;
+    bool operator==(const CellBox&) const = default;
+};
+
+/// Numbers go to the cells and nodes of a part of the lattice, row by row; the arrays of a method have room for no others. One ring of
+/// cells around that part takes what a point's box spreads over the edge of the lattice, and a second, always empty one lets every node of
+/// the first look at four cells.
 struct Lattice
 {
-    Vec2 origin{0, 0};
-    double cell_size = 1;  ///< L [m]
-    int nx = 0, ny = 0;    ///< cells
+    Vec2 origin;
+    double cell_size;  ///< L [m]
+    int nx, ny;        ///< cells
+    CellBox numbered;  ///< without the rings
 
-    std::size_t cell_stride() const { return static_cast<std::size_t>(nx) + 4; }
-    std::size_t node_stride() const { return static_cast<std::size_t>(nx) + 3; }
-    std::size_t cell(int i, int j) const { return static_cast<std::size_t>(i + 2) + static_cast<std::size_t>(j + 2) * cell_stride(); }
-    std::size_t node(int i, int j) const { return static_cast<std::size_t>(i + 1) + static_cast<std::size_t>(j + 1) * node_stride(); }
-    std::size_t cells() const { return cell_stride() * (static_cast<std::size_t>(ny) + 4); }
-    std::size_t nodes() const { return node_stride() * (static_cast<std::size_t>(ny) + 3); }
-    int cell_i(std::size_t c) const { return static_cast<int>(c % cell_stride()) - 2; }
-    int cell_j(std::size_t c) const { return static_cast<int>(c / cell_stride()) - 2; }
-    int node_i(std::size_t n) const { return static_cast<int>(n % node_stride()) - 1; }
-    int node_j(std::size_t n) const { return static_cast<int>(n / node_stride()) - 1; }
+    /// All of it is numbered.
+    Lattice(const Vec2& corner, double L, int columns, int rows)
+        : origin(corner), cell_size(L), nx(columns), ny(rows), numbered{0, 0, columns, rows}
+    {
+    }
+    std::size_t cell_stride() const { return static_cast<std::size_t>(numbered.i1 - numbered.i0) + 4; }
+    std::size_t node_stride() const { return static_cast<std::size_t>(numbered.i1 - numbered.i0) + 3; }
+    std::size_t cell(int i, int j) const
+    {
+        return static_cast<std::size_t>(i - numbered.i0 + 2) + static_cast<std::size_t>(j - numbered.j0 + 2) * cell_stride();
+    }
+    std::size_t node(int i, int j) const
+    {
+        return static_cast<std::size_t>(i - numbered.i0 + 1) + static_cast<std::size_t>(j - numbered.j0 + 1) * node_stride();
+    }
+    std::size_t cells() const { return cell_stride() * (static_cast<std::size_t>(numbered.j1 - numbered.j0) + 4); }
+    std::size_t nodes() const { return node_stride() * (static_cast<std::size_t>(numbered.j1 - numbered.j0) + 3); }
+    bool has_node(int i, int j) const
+    {
+        return i >= numbered.i0 - 1 && i <= numbered.i1 + 1 && j >= numbered.j0 - 1 && j <= numbered.j1 + 1;
+    }
+    int cell_i(std::size_t c) const { return static_cast<int>(c % cell_stride()) - 2 + numbered.i0; }
+    int cell_j(std::size_t c) const { return static_cast<int>(c / cell_stride()) - 2 + numbered.j0; }
+    int node_i(std::size_t n) const { return static_cast<int>(n % node_stride()) - 1 + numbered.i0; }
+    int node_j(std::size_t n) const { return static_cast<int>(n / node_stride()) - 1 + numbered.j0; }
     Vec2 node_position(const NodeIndex& n) const { return {origin[0] + n.i * cell_size, origin[1] + n.j * cell_size}; }
     Vec2 node_position(std::size_t n) const { return node_position(NodeIndex{node_i(n), node_j(n)}); }
 };
+
+inline Lattice without_numbers(Lattice lattice)
+{
+    lattice.numbered = {0, 0, 0, 0};
+    return lattice;
+}
+
+/// Takes nodal values to other numbers: those of the nodes that both lattices number; the other nodes have zero.
+inline void renumber(std::vector<double>& values, const Lattice& from, const Lattice& to)
+{
+    const CellBox &a = from.numbered, &b = to.numbered;
+    const int i0 = std::max(a.i0, b.i0) - 1, i1 = std::min(a.i1, b.i1) + 1, j0 = std::max(a.j0, b.j0) - 1, j1 = std::min(a.j1, b.j1) + 1;
+    std::vector<double> moved(to.nodes(), 0.0);
+    if (i0 <= i1)
+        for (int j = j0; j <= j1; ++j)
+            std::copy_n(&values[from.node(i0, j)], i1 - i0 + 1, &moved[to.node(i0, j)]);
+    values.swap(moved);
+}
 
 /// Consecutive numbers of cells or nodes, for loops without an index per entity.
 struct Run
@@ -84,6 +127,17 @@ public:
         active_ = std::move(ascending);
         runs_ = runs_of(active_, mass.size() + 1);
         ++version_;
+    }
+    /// Takes all values to other numbers; nodes without one are no longer active.
+    void renumber(const Lattice& from, const Lattice& to)
+    {
+        for (auto* values : {&mass, &vx, &vy, &fx, &fy})
+            testbed::renumber(*values, from, to);
+        std::vector<std::uint32_t> active;
+        for (const auto n : active_)
+            if (const int i = from.node_i(n), j = from.node_j(n); to.has_node(i, j))
+                active.push_back(static_cast<std::uint32_t>(to.node(i, j)));
+        set_active(std::move(active));
     }
     /// kernel(i, lanes) for the active nodes [i, i + lanes).
     template <class Kernel>

@@ -8,7 +8,7 @@ double nonlocal_weight(const NonlocalSpec& spec, double r)
     return (spec.weight == "gauss" ? 1 : s) * std::exp(-s * s);
 }
 
-NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size, std::size_t stride, std::size_t entities) : stride_(stride)
+NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size)
 {
     const NonlocalSpec* spec = nullptr;
     for (const BodySpec& body : scene.bodies)
@@ -23,6 +23,12 @@ NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size, std::size_t
     for (int j = -reach_; j <= reach_; ++j)
         for (int i = -reach_; i <= reach_; ++i)
             weight_.push_back(nonlocal_weight(*spec, cell_size * std::hypot(i, j)));
+}
+
+void NonlocalStrain::resize(std::size_t stride, std::size_t entities)
+{
+    stride_ = stride;
+    filled_.clear();
     volume_.assign(entities + 2 * padding(), 0.0);
     strain_.assign(entities + 2 * padding(), 0.0);
     mean_.assign(entities, 0.0);

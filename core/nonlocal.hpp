@@ -21,8 +21,10 @@ inline bool has_nonlocal_softening(const Scene& scene)
 class NonlocalStrain
 {
 public:
-    /// @param stride of the entities (cells or nodes) of the lattice @param entities their number
-    NonlocalStrain(const Scene& scene, double cell_size, std::size_t stride, std::size_t entities);
+    NonlocalStrain(const Scene& scene, double cell_size);
+
+    /// @param stride of the entities (cells or nodes) of the lattice @param entities how many have a number
+    void resize(std::size_t stride, std::size_t entities);
 
     /// Sets the softening strain of all points whose law asks for it, from their plastic shear strain.
     /// @param index (i, j) -> number of the cell or node
@@ -70,7 +72,7 @@ private:
     std::size_t padding() const { return static_cast<std::size_t>(reach_) * (stride_ + 1); }
 
     std::vector<double> over_nonlocal_;  ///< m by body, zero for a body without
-    std::size_t stride_;
+    std::size_t stride_ = 0;
     int reach_;                                   ///< of the weight [cells]
     std::vector<double> weight_;                  ///< (2 reach + 1)^2
     std::vector<double> volume_, strain_, mean_;  ///< by entity; strain: times volume; both padded by the reach of the weight

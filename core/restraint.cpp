@@ -34,12 +34,13 @@ double hold_face(const Nodes& carrier, const Pair& p, std::vector<double>& f)
 template <class Take>
 void for_each_used(const std::vector<NodeIndex>& ascending, const Lattice& lattice, const std::vector<std::uint32_t>& active, Take&& take)
 {
-    auto from = active.begin();
-    for (const NodeIndex& n : ascending)
+    auto listed = ascending.begin();
+    for (const auto number : active)
     {
-        const auto number = static_cast<std::uint32_t>(lattice.node(n.i, n.j));
-        from = std::lower_bound(from, active.end(), number);
-        if (from != active.end() && *from == number)
+        const NodeIndex n{lattice.node_i(number), lattice.node_j(number)};
+        if (listed != ascending.end() && *listed < n)
+            listed = std::lower_bound(listed, ascending.end(), n);
+        if (listed != ascending.end() && *listed == n)
             take(number);
     }
 }
@@ -50,6 +51,8 @@ void DrivenNodes::find(const std::vector<Restraint>& restraints, const Lattice& 
     const auto& active = nodes.active();
     const auto used = [&](const NodeIndex& n) -> std::optional<std::uint32_t>
     {
+        if (!lattice.has_node(n.i, n.j))
+            return std::nullopt;
         const auto number = static_cast<std::uint32_t>(lattice.node(n.i, n.j));
         return std::binary_search(active.begin(), active.end(), number) ? std::optional(number) : std::nullopt;
     };

@@ -88,20 +88,22 @@ std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice& l
 
 Lattice mesh_lattice(const Scene& scene)
 {
-    Lattice lattice = make_lattice(scene.grid);
+    const Lattice lattice = make_lattice(scene.grid);
     const auto box = std::find_if(scene.bodies.begin(), scene.bodies.end(), [](const BodySpec& body) { return body.shape == "box"; });
     if (box == scene.bodies.end())
         return lattice;
+    Vec2 origin = lattice.origin;
+    std::array<int, 2> cells{lattice.nx, lattice.ny};
     for (std::size_t k = 0; k < 2; ++k)
     {
-        const double cells = ((*box->min)[k] - lattice.origin[k]) / lattice.cell_size;
-        const double part = cells - std::floor(cells + 1e-6);
+        const double place = ((*box->min)[k] - lattice.origin[k]) / lattice.cell_size;
+        const double part = place - std::floor(place + 1e-6);
         if (part < 1e-6)
             continue;
-        lattice.origin[k] += (part - 1) * lattice.cell_size;
-        ++(k == 0 ? lattice.nx : lattice.ny);
+        origin[k] += (part - 1) * lattice.cell_size;
+        ++cells[k];
     }
-    return lattice;
+    return {origin, lattice.cell_size, cells[0], cells[1]};
 }
 
 void make_mesh(const Scene& scene, const Lattice& lattice, const Warn& warn, dealii::Triangulation<2>& mesh)

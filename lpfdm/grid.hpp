@@ -41,6 +41,15 @@ struct LpfdmGrid
 
     explicit LpfdmGrid(const Lattice& l) : lattice(l), cells(l.cells()), nodes(l.nodes()), gather(l.cells()) {}
 
+    /// Takes the nodes to the numbers of another lattice; the cells are empty until the next rebuild().
+    void renumber(const Lattice& to)
+    {
+        nodes.renumber(lattice, to);
+        cells = Cells(to.cells());
+        gather = Gather(to.cells());
+        lattice = to;
+    }
+
     /// Corner k = 0..3, nodes [1]..[4], of the cell whose corner [1] is `first`.
     std::size_t corner(std::size_t first, int k) const
     {

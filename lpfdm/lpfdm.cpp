@@ -17,26 +17,18 @@ class Lpfdm final : public Solver
 {
 public:
     explicit Lpfdm(const Scene& scene)
-        : grid_(make_lattice(scene.grid)),
-          bodies_(make_bodies(scene, grid_.lattice, {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
-          node_ops_(scene, grid_.lattice),
+        : grid_(without_numbers(make_lattice(scene.grid))),
+          bodies_(make_bodies(scene, make_lattice(scene.grid), {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
+          node_ops_(scene, make_lattice(scene.grid)),
           was_active_(grid_.lattice.nodes(), 0),
           options_(scene.lpfdm)
     {
         if (scene.body_force)
-        {
-            cell_force_.resize(grid_.lattice.cells());
             body_force_.emplace(*scene.body_force, scene.expression_constants());
-        }
         if (!scene.tractions.empty())
             tractions_.emplace(scene);
         if (has_nonlocal_softening(scene))
-            nonlocal_.emplace(scene, grid_.lattice.cell_size, grid_.lattice.cell_stride(), grid_.lattice.cells());
-        if (options_.hourglass > 0)
-        {
-            hourglass_x_.resize(grid_.lattice.cells());
-            hourglass_y_.resize(grid_.lattice.cells());
-        }
+            nonlocal_.emplace(scene, grid_.lattice.cell_size);
         for (const Body& body : bodies_)
             wave_speed_ =
                 std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
@@ -68,7 +60,7 @@ public:
                    convect_velocity(dt);
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
-        if (!hourglass_x_.empty())
+        if (options_.hourglass > 0)
             timer_("hourglass", [&]
                    { resist_hourglass(grid_, options_.hourglass * wave_speed_ / grid_.lattice.cell_size, hourglass_x_, hourglass_y_); });
         internal_ = force_norm(nodes_);
@@ -127,6 +119,8 @@ public:
         if (!(cx >= 0 && cx < grid_.lattice.nx && cy >= 0 && cy < grid_.lattice.ny))
             return {0, 0};
         const int i = static_cast<int>(cx), j = static_cast<int>(cy);
+        if (!grid_.lattice.has_node(i, j) || !grid_.lattice.has_node(i + 1, j + 1))
+            return {0, 0};
         const double a = cx - i, b = cy - j;
         Vec2 v{0, 0};
         for (int k = 0; k < 4; ++k)
@@ -166,6 +160,8 @@ private:
         }
         if (other_bins)
         {
+            if (const Lattice lattice = with_numbers_for<S>(grid_.lattice, bins); lattice.numbered != grid_.lattice.numbered)
+                renumber(lattice);
             left_ = grid_.rebuild<S>(bins);
             gradients_over_ = 0;
             was_rebuilt_ = true;
@@ -174,6 +170,21 @@ private:
         else
             sums_.update_changed(grid_.lattice, bodies_);
         moved_ = false;
+    }
+
+    void renumber(const Lattice& to)
+    {
+        testbed::renumber(was_active_, grid_.lattice, to);
+        grid_.renumber(to);
+        if (body_force_)
+            cell_force_.assign(to.cells(), {0, 0});
+        if (nonlocal_)
+            nonlocal_->resize(to.cell_stride(), to.cells());
+        if (options_.hourglass > 0)
+        {
+            hourglass_x_.assign(to.cells(), 0.0);
+            hourglass_y_.assign(to.cells(), 0.0);
+        }
     }
 
     /// Nodes that material reaches for the first time take the mass-weighted mean velocity of their neighbours that were
@@ -236,7 +247,7 @@ private:
         for (int dj = -1; dj <= 1; ++dj)
             for (int di = -1; di <= 1; ++di)
             {
-                if (i + di < -1 || i + di > grid_.lattice.nx + 1 || j + dj < -1 || j + dj > grid_.lattice.ny + 1)
+                if (!grid_.lattice.has_node(i + di, j + dj))
                     continue;
                 const std::size_t n = grid_.lattice.node(i + di, j + dj);
                 if (!was_active_[n])

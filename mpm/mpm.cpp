@@ -19,10 +19,10 @@ class Mpm final : public Solver
 {
 public:
     explicit Mpm(const Scene& scene)
-        : lattice_(make_lattice(scene.grid)),
-          bodies_(
-              make_bodies(scene, lattice_, {.box = Shape::has_box, .velocity = true, .initial_position = scene.body_force.has_value()})),
-          node_ops_(scene, lattice_),
+        : lattice_(without_numbers(make_lattice(scene.grid))),
+          bodies_(make_bodies(scene, make_lattice(scene.grid),
+                              {.box = Shape::has_box, .velocity = true, .initial_position = scene.body_force.has_value()})),
+          node_ops_(scene, make_lattice(scene.grid)),
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
           options_(scene.mpm)
@@ -32,7 +32,7 @@ public:
         if (!scene.tractions.empty())
             tractions_.emplace(scene);
         if (has_nonlocal_softening(scene))
-            nonlocal_.emplace(scene, lattice_.cell_size, lattice_.node_stride(), lattice_.nodes());
+            nonlocal_.emplace(scene, lattice_.cell_size);
         rebuild();
     }
 
@@ -150,6 +150,8 @@ private:
         }
         if (other_bins)
         {
+            if (const Lattice lattice = with_numbers_for<S>(lattice_, bins); lattice.numbered != lattice_.numbered)
+                renumber(lattice);
             gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
             for (const auto n : nodes_.active())  // what is left must not be taken for soil
                 nodes_.mass[n] = nodes_.vx[n] = nodes_.vy[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
@@ -160,6 +162,15 @@ private:
         if (options_.scheme != "usf")
             other_bins ? sums_.update(lattice_, bodies_) : sums_.update_changed(lattice_, bodies_);
         moved_ = false;
+    }
+
+    void renumber(const Lattice& to)
+    {
+        nodes_.renumber(lattice_, to);
+        gather_ = Gather(to.nodes());
+        if (nonlocal_)
+            nonlocal_->resize(to.node_stride(), to.nodes());
+        lattice_ = to;
     }
 
     /// Mass, velocity and internal force of the nodes, or a part of them, from the points.

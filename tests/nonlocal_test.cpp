@@ -34,8 +34,8 @@ void check_against_double_sum(const std::string& weight, double tolerance)
     const auto strain = [](double x, double y) { return 0.02 * (1 + std::sin(1.1 * x) * std::cos(0.8 * y)); };
     for (std::size_t p = 0; p < q.count; ++p)
         q.plastic_shear[p] = strain(q.x[p], q.y[p]);
-    NonlocalStrain nonlocal(scene, lattice.cell_size, cells ? lattice.cell_stride() : lattice.node_stride(),
-                            cells ? lattice.cells() : lattice.nodes());
+    NonlocalStrain nonlocal(scene, lattice.cell_size);
+    nonlocal.resize(cells ? lattice.cell_stride() : lattice.node_stride(), cells ? lattice.cells() : lattice.nodes());
     nonlocal.apply<Support>(lattice, bodies, gather, index);
     const NonlocalSpec& spec = *scene.materials[0].softening->nonlocal;
     for (std::size_t p = 0; p < q.count; p += 37)
@@ -78,7 +78,9 @@ TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
     const std::vector<const Bins*> bins{&bodies[0].bins};
     gather.rebuild<1>(bins, index);
     bodies[0].points.plastic_shear[700] = 0.01;  // one point: its own strain counts -0.7, the mean next to nothing
-    NonlocalStrain(scene, lattice.cell_size, lattice.cell_stride(), lattice.cells()).apply<PointSupport>(lattice, bodies, gather, index);
+    NonlocalStrain nonlocal(scene, lattice.cell_size);
+    nonlocal.resize(lattice.cell_stride(), lattice.cells());
+    nonlocal.apply<PointSupport>(lattice, bodies, gather, index);
     EXPECT_EQ(bodies[0].points.softening_strain[700], 0);
     EXPECT_GT(bodies[0].points.softening_strain[704], 0);
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = "gauss"}, 2), std::exp(-1.0));
