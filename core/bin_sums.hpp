@@ -44,8 +44,10 @@ public:
         {
             const auto& changed = body.bins.changed();
             parallel_for(
-                changed.size(), [&](std::size_t k) TESTBED_FLATTEN
-                { sum_bin<Support, Sums>(lattice, body, body.bins.list()[changed[k]], of(first + changed[k])); }, 64);
+                changed.size(),
+                [&](std::size_t k) TESTBED_FLATTEN
+                { sum_bin<Support, Sums>(lattice, body, body.bins.list()[changed[k]], of(first + changed[k])); },
+                64);
             first += body.bins.list().size();
         }
     }

@@ -295,6 +295,8 @@ Lattice with_numbers_for(const Lattice& lattice, std::span<const Bins* const> bi
     for (const Bins* b : bins)
         for (const Bin& bin : b->list())
             reach = {std::min(reach.i0, bin.i), std::min(reach.j0, bin.j), std::max(reach.i1, bin.i + S), std::max(reach.j1, bin.j + S)};
+    reach.i1 = std::min(reach.i1, lattice.nx + 1);  // nodes have one line more than cells have columns
+    reach.j1 = std::min(reach.j1, lattice.ny + 1);
     const CellBox& has = lattice.numbered;  // the first ring may be reached, too
     if (reach.i0 >= has.i0 - 1 && reach.j0 >= has.j0 - 1 && reach.i1 <= has.i1 + 1 && reach.j1 <= has.j1 + 1)
         return lattice;

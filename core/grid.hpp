@@ -40,7 +40,11 @@ struct Lattice
 
     /// All of it is numbered.
     Lattice(const Vec2& corner, double L, int columns, int rows)
-        : origin(corner), cell_size(L), nx(columns), ny(rows), numbered{0, 0, columns, rows}
+        : origin(corner),
+          cell_size(L),
+          nx(columns),
+          ny(rows),
+          numbered{0, 0, columns, rows}
     {
     }
     std::size_t cell_stride() const { return static_cast<std::size_t>(numbered.i1 - numbered.i0) + 4; }

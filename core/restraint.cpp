@@ -63,7 +63,9 @@ void DrivenNodes::find(const std::vector<Restraint>& restraints, const Lattice& 
         for (std::uint16_t k = 0; k < 2; ++k)
         {
             for_each_used(restraints[r].components[k].nodes, lattice, active,
-                          [&](std::uint32_t n) { stages_.back().nodes.push_back({n, restraint, k}); });
+                          [&](std::uint32_t n) {
+                              stages_.back().nodes.push_back({n, restraint, k});
+                          });
             for (const FacePair& p : restraints[r].components[k].pairs)
                 if (const auto low = used(p.low), high = used(p.high); low && high)
                     stages_.back().pairs.push_back({*low, *high, p.share, restraint, k});
@@ -75,8 +77,8 @@ void DrivenNodes::find(const std::vector<Restraint>& restraints, const Lattice& 
     {
         const auto place = [](const Driven& d) { return std::pair(d.node, d.component); };
         std::stable_sort(stage.nodes.begin(), stage.nodes.end(), [&](const Driven& a, const Driven& b) { return place(a) < place(b); });
-        const auto last = std::unique(stage.nodes.rbegin(), stage.nodes.rend(),
-                                      [&](const Driven& a, const Driven& b) { return place(a) == place(b); });
+        const auto last =
+            std::unique(stage.nodes.rbegin(), stage.nodes.rend(), [&](const Driven& a, const Driven& b) { return place(a) == place(b); });
         stage.nodes.erase(stage.nodes.begin(), last.base());
     }
 }

@@ -144,7 +144,7 @@ struct BinMotion
 {
     static constexpr int S = Support::S;
     std::array<Gradient<>, S * S> coefficients;  ///< of 1, a, b and a b, with the shares a and b of a box in the next cells
-    const double *vx, *vy;  ///< of the bin's first node
+    const double *vx, *vy;                       ///< of the bin's first node
     std::size_t stride;
 
     TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin)

@@ -18,7 +18,8 @@ class Lpfdm final : public Solver
 public:
     explicit Lpfdm(const Scene& scene)
         : grid_(without_numbers(make_lattice(scene.grid))),
-          bodies_(make_bodies(scene, make_lattice(scene.grid), {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
+          bodies_(
+              make_bodies(scene, make_lattice(scene.grid), {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
           node_ops_(scene, make_lattice(scene.grid)),
           was_active_(grid_.lattice.nodes(), 0),
           options_(scene.lpfdm)
@@ -162,6 +163,9 @@ private:
         {
             if (const Lattice lattice = with_numbers_for<S>(grid_.lattice, bins); lattice.numbered != grid_.lattice.numbered)
                 renumber(lattice);
+            if (options_.hourglass > 0)
+                for (const auto c : grid_.gather.active())  // the nodes around a cell that goes out of use may stay
+                    hourglass_x_[c] = hourglass_y_[c] = 0;
             left_ = grid_.rebuild<S>(bins);
             gradients_over_ = 0;
             was_rebuilt_ = true;

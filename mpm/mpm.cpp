@@ -389,7 +389,8 @@ private:
                                   lanes.store(&q.x[p], x);
                                   lanes.store(&q.y[p], y);
                                   if constexpr (!with_stress)
-                                      left |= stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x, y)));
+                                      left |= stdx::any_of(
+                                          frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x, y)));
                               });
                 if constexpr (with_stress)
                     left |= sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number));

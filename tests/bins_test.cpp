@@ -171,6 +171,77 @@ TEST(Lattice, IndicesInvert)
     EXPECT_DOUBLE_EQ(lattice.node_position(lattice.node(2, 3))[1], 3.5);
 }
 
+/// Numbers of a part of the lattice: with its rings each node has one of its own, and values keep their nodes on the way to other numbers.
+TEST(Lattice, NumbersAPart)
+{
+    Lattice part{{0, 0}, 1.0, 100, 80}, other = part;
+    part.numbered = {10, 20, 14, 22};
+    other.numbered = {12, 17, 30, 21};
+    EXPECT_EQ(part.nodes(), 7u * 5u);
+    EXPECT_EQ(part.cells(), 8u * 6u);
+    std::vector<double> values(part.nodes());
+    for (int j = 19; j <= 23; ++j)
+        for (int i = 9; i <= 15; ++i)
+        {
+            ASSERT_TRUE(part.has_node(i, j));
+            const std::size_t n = part.node(i, j);
+            EXPECT_EQ(part.node_i(n), i);
+            EXPECT_EQ(part.node_j(n), j);
+            EXPECT_EQ(part.node_position(n), (Vec2{1.0 * i, 1.0 * j}));
+            EXPECT_EQ(part.cell_i(part.cell(i, j)), i);
+            EXPECT_EQ(part.cell_j(part.cell(i, j)), j);
+            values[n] = 100 * i + j;
+        }
+    for (const auto& [i, j] : {std::pair{8, 20}, {16, 20}, {12, 18}, {12, 24}})
+        EXPECT_FALSE(part.has_node(i, j));
+    renumber(values, part, other);
+    ASSERT_EQ(values.size(), other.nodes());
+    for (int j = 16; j <= 22; ++j)
+        for (int i = 11; i <= 31; ++i)
+            EXPECT_EQ(values[other.node(i, j)], part.has_node(i, j) ? 100 * i + j : 0);
+    Nodes nodes(part.nodes());
+    nodes.set_active({static_cast<std::uint32_t>(part.node(10, 20)), static_cast<std::uint32_t>(part.node(13, 21))});
+    nodes.mass[part.node(13, 21)] = 5;
+    const std::size_t version = nodes.version();
+    nodes.renumber(part, other);
+    EXPECT_GT(nodes.version(), version);
+    EXPECT_EQ(nodes.active(), (std::vector<std::uint32_t>{static_cast<std::uint32_t>(other.node(13, 21))}));
+    EXPECT_EQ(nodes.mass[other.node(13, 21)], 5);
+    Lattice apart = part;
+    apart.numbered = {90, 70, 92, 72};
+    std::vector<double> none(part.nodes(), 1.0);
+    renumber(none, part, apart);
+    EXPECT_EQ(none, std::vector<double>(apart.nodes(), 0.0));
+}
+
+/// All that bins touch has a number, at the edges of the lattice the rings, too; the numbers stay while they do.
+TEST(Lattice, NumbersFollowTheBins)
+{
+    const Lattice all{{0, 0}, 1.0, 200, 150};
+    Points q = random_points(1, 3);
+    const auto around = [&](const Lattice& now, double x, double y)
+    {
+        Bins bins(all);
+        std::vector<double> workspace;
+        q.x[0] = x;
+        q.y[0] = y;
+        bins.rebuild<BSplineShape>(q, workspace);
+        const Bins* list = &bins;
+        const Lattice lattice = with_numbers_for<3>(now, {&list, 1});
+        const Bin& b = bins.list()[0];
+        EXPECT_TRUE(lattice.has_node(b.i, b.j) && lattice.has_node(b.i + 2, b.j + 2)) << x << ' ' << y;
+        return lattice.numbered;
+    };
+    Lattice now = without_numbers(all);
+    now.numbered = around(now, 100.7, 70.7);
+    EXPECT_EQ(now.numbered, (CellBox{100 - 16, 70 - 16, 103 + 16, 73 + 16}));
+    EXPECT_EQ(around(now, 110.7, 60.7), now.numbered);
+    EXPECT_EQ(around(now, 83.7, 70.7), now.numbered);  // in its ring
+    EXPECT_EQ(around(now, 82.7, 70.7), (CellBox{66, 54, 101, 89}));
+    EXPECT_EQ(around(now, 0.2, 149.9), (CellBox{0, 133, 18, 150}));
+    EXPECT_EQ(around(all, 0.2, 149.9), all.numbered);
+}
+
 TEST(OrderedSum, SameBitsForAnyThreads)
 {
     test::Random random(12);

@@ -198,6 +198,7 @@ INSTANTIATE_TEST_SUITE_P(Variants, LpfdmOracle,
                                          LpfdmCase{"point_central", "lpfdm-2000", {"lpfdm.convection=central"}, false, true},
                                          LpfdmCase{"domain_central", "lpfdm", {}, true, true},
                                          LpfdmCase{"domain_upwind", "lpfdm", {"lpfdm.convection=upwind"}, true, false},
+                                         LpfdmCase{"point_hourglass", "lpfdm-2000", {"lpfdm.hourglass=0.3"}, false, false},
                                          LpfdmCase{"strong_hourglass", "lpfdm", {"lpfdm.hourglass=0.3"}, true, true}),
                          [](const auto& info) { return std::string(info.param.name); });
 

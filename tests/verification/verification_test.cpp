@@ -7,6 +7,7 @@
 #include "lpfdm/lpfdm.hpp"
 #include "mpm/mpm.hpp"
 
+#include <fstream>
 #include <gtest/gtest.h>
 
 using namespace testbed;
@@ -200,6 +201,88 @@ TEST(FreeFlight, MomentumAndNoStress)
         for (std::size_t p = 0; p < q.count; ++p)
             ASSERT_LT(std::abs(q.sxx[p]) + std::abs(q.syy[p]) + std::abs(q.sxy[p]), 1e-6 * 5e7) << method;
     }
+}
+
+/// Arrays that follow a block over 25 cells and against a support hold the same as arrays over the whole lattice, which two cells of soil
+/// in its corners ask for: the same bits, but for nonlocal means, whose sums then begin elsewhere.
+TEST(EmptyLattice, MakesNoDifference)
+{
+    const std::string scene = R"toml(
+[grid]
+size = [30.0, 20.0]
+cell_size = 0.5
+[time]
+end = 3.5
+dt = 0.01
+[body_force]
+acceleration = ["0.1*sin(t)*(X>5)*(X<9)", "0.05*(X>5)*(X<9)"]
+[[material]]
+name = "soil"
+law = "mohr_coulomb"
+density = 1000.0
+youngs_modulus = 3e5
+poissons_ratio = 0.3
+[material.strength]
+cohesion = 1e3
+friction_angle = 0.4
+[[boundary]]
+name = "buffer"
+where = "x >= 20"
+fix = "x"
+[[body]]
+name = "block"
+material = "soil"
+shape = "box"
+min = [5.2, 8.3]
+max = [8.2, 10.3]
+points_per_cell = 3
+velocity = ["4+0.02*Y", "-0.02*X"]
+[[traction]]
+name = "push"
+body = "block"
+face = "left"
+traction = ["50", "0"]
+)toml";
+    const auto corner = [](const char* name, const char* min, const char* max)
+    {
+        return std::string("[[body]]\nname = \"") + name + "\"\nmaterial = \"soil\"\nshape = \"box\"\nmin = " + min + "\nmax = " + max +
+               "\npoints_per_cell = 2\n";
+    };
+    const std::string corners = corner("low", "[0.0, 2.0]", "[0.5, 2.5]") + corner("high", "[29.5, 19.0]", "[30.0, 19.5]");
+    const std::string nonlocal = "[material.softening]\nkind = \"linear\"\nresidual = 0.5\nstrain = 0.1\n[material.softening.nonlocal]\n"
+                                 "internal_length = 0.8\nover_nonlocal = 1.2\n";
+    const auto after = [](const std::string& text, const std::string& method)
+    {
+        const std::string path = testing::TempDir() + "empty_lattice.toml";
+        std::ofstream(path) << text;
+        const Scene s = load_scene(path, method, {}).scene;
+        const auto solver = find_variant(method).family == "mpm" ? make_mpm(s) : make_lpfdm(s);
+        for (int n = 0; n < 350; ++n)
+        {
+            solver->prepare(n * 0.01, 0.01);
+            solver->advance(0.01);
+        }
+        std::vector<std::array<double, 4>> out(solver->bodies()[0].points.count);
+        const Points& q = solver->bodies()[0].points;
+        for (std::size_t p = 0; p < q.count; ++p)
+            out[q.id[p]] = {q.x[p], q.y[p], q.sxx[p], q.syy[p]};
+        return std::pair(out, solver->bytes());
+    };
+    auto methods = particle_methods;
+    methods.emplace_back("mpm-bspline");
+    for (const auto& method : methods)
+        for (const bool is_nonlocal : {false, true})
+        {
+            std::string text = scene;
+            if (is_nonlocal)
+                text.insert(text.find("[[boundary]]"), nonlocal);
+            const auto [part, small] = after(text, method);
+            const auto [all, large] = after(text + corners, method);
+            EXPECT_LT(small, large);
+            for (std::size_t p = 0; p < part.size(); ++p)
+                for (std::size_t k = 0; k < 4; ++k)
+                    ASSERT_NEAR(part[p][k], all[p][k], is_nonlocal ? 1e-9 * std::max(1.0, std::abs(all[p][k])) : 0) << method << ' ' << p;
+        }
 }
 
 /// The printed scheme says nothing of nodes that are reached for the first time: from zero they stop the block.
