@@ -71,9 +71,10 @@ struct Lattice
     Vec2 node_position(std::size_t n) const { return node_position(NodeIndex{node_i(n), node_j(n)}); }
 };
 
+/// No node of it has a number, not even in a ring.
 inline Lattice without_numbers(Lattice lattice)
 {
-    lattice.numbered = {0, 0, 0, 0};
+    lattice.numbered = {0, 0, -3, -3};
     return lattice;
 }
 

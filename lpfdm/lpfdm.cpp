@@ -195,7 +195,7 @@ private:
     /// active before (or start from zero, as printed); nodes that it left are cleared.
     void extend_to_frontier()
     {
-        if (!std::exchange(was_rebuilt_, false) && (S == 1 || !frontier_moved()))  // a cell of points alone has mass while it is in use
+        if (!std::exchange(was_rebuilt_, false) && (S == 1 || !frontier_moved()))  // with S = 1 a cell in use has mass
             return;
         gradients_over_ = 0;
         std::vector<std::pair<std::uint32_t, Vec2>> reached;

@@ -233,13 +233,20 @@ TEST(Lattice, NumbersFollowTheBins)
         return lattice.numbered;
     };
     Lattice now = without_numbers(all);
+    EXPECT_EQ(now.nodes(), 0u);
+    EXPECT_FALSE(now.has_node(0, 0));
+    EXPECT_EQ(around(now, 0.2, 0.2), (CellBox{0, 0, 18, 18}));  // bins from -1 on
     now.numbered = around(now, 100.7, 70.7);
     EXPECT_EQ(now.numbered, (CellBox{100 - 16, 70 - 16, 103 + 16, 73 + 16}));
     EXPECT_EQ(around(now, 110.7, 60.7), now.numbered);
-    EXPECT_EQ(around(now, 83.7, 70.7), now.numbered);  // in its ring
+    for (const auto& [x, y] : {Vec2{83.7, 70.7}, {117.7, 70.7}, {100.7, 53.7}, {100.7, 87.7}})
+        EXPECT_EQ(around(now, x, y), now.numbered) << x << ' ' << y;  // in its ring
     EXPECT_EQ(around(now, 82.7, 70.7), (CellBox{66, 54, 101, 89}));
+    EXPECT_EQ(around(now, 118.7, 70.7), (CellBox{102, 54, 137, 89}));
+    EXPECT_EQ(around(now, 100.7, 52.7), (CellBox{84, 36, 119, 71}));
+    EXPECT_EQ(around(now, 100.7, 88.7), (CellBox{84, 72, 119, 107}));
     EXPECT_EQ(around(now, 0.2, 149.9), (CellBox{0, 133, 18, 150}));
-    EXPECT_EQ(around(all, 0.2, 149.9), all.numbered);
+    EXPECT_EQ(around(all, 199.9, 149.9), all.numbered);
 }
 
 TEST(OrderedSum, SameBitsForAnyThreads)

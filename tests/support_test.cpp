@@ -153,6 +153,14 @@ TEST(BinFrame, SeesWhoLeft)
         EXPECT_TRUE(stdx::any_of(frame.left<PointSupport>(q, 0, AllLanes{}, inside))) << bad;
     }
     reset();
+    for (const double a : {0.4, 0.6})  // B-splines begin half a cell from the point: the edge of the lattice lies in the middle of a bin
+        for (const int first : {-1, 3})
+        {
+            const Corner c{Pack(a), Pack(a), Pack(0.0), Pack(0.0)};
+            const Bin left_or_right{first, 1, 0, 1}, low_or_high{1, first, 0, 1};
+            for (const Bin& bin : {left_or_right, low_or_high})
+                EXPECT_EQ(stdx::any_of(BinFrame(lattice, bin).left<BSplineShape>(q, 0, AllLanes{}, c)), (a < 0.5) == (first < 0)) << a;
+        }
     Corner behind = inside;
     if (pack_size > 1)
     {
