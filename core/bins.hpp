@@ -1,6 +1,7 @@
 #pragma once
 /// Points kept contiguous by bin. A bin is the cell that holds the lower left corner of a point's support, so that all its
-/// points touch the same S x S cells or nodes. The order is rebuilt only in a step in which a point changed its bin.
+/// points touch the same S x S cells or nodes. Points are sorted only in a step in which one changed its bin, the list of bins changes only
+/// if one is new or empty.
 
 #include "core/grid.hpp"
 #include "core/points.hpp"
@@ -29,13 +30,13 @@ struct Bin
 class Bins
 {
 public:
-    explicit Bins(const Lattice& lattice) : lattice_(lattice), slot_(lattice.cells(), -1) {}
+    explicit Bins(const Lattice& lattice) : lattice_(lattice), slots_(without_numbers(lattice)) {}
 
     const std::vector<Bin>& list() const { return bins_; }
     /// The number that bin b had before the last rebuild() if the same points are in it, which then were not marked.
     std::optional<std::uint32_t> unchanged(std::size_t b) const { return before_[b] == none ? std::nullopt : std::optional(before_[b]); }
     std::size_t size_before() const { return size_before_; }
-    /// The bins that are not unchanged, if the last rebuild() left the list as it was.
+    /// The bins that are not unchanged, if the last rebuild() left the list as it was; else none.
     const std::vector<std::uint32_t>& changed() const { return changed_; }
 
     /// Notes that a point of bin number `b` may have left it. Different bins may be marked by different threads.
@@ -53,7 +54,6 @@ public:
         if (is_first)
         {
             bins_.push_back({0, 0, 0, static_cast<std::uint32_t>(points.count)});
-            slot_[lattice_.cell(0, 0)] = 0;
             marked_.assign(1, 1);
         }
         before_.resize(bins_.size());
@@ -63,15 +63,17 @@ public:
         if (const auto lost = find_lost())
         {
             if (is_first)
-            {
-                slot_[lattice_.cell(0, 0)] = -1;
                 bins_.clear();
-            }
             throw_left_lattice(points, *lost);
         }
+        if (is_first)
+            std::tie(bins_[0].i, bins_[0].j) = std::pair(lattice_.cell_i(key_[0]), lattice_.cell_j(key_[0]));
+        make_slots();
         const bool has_new = insert_new();
         exchange();
         const bool has_lost = erase_empty();
+        if (has_new || has_lost)
+            changed_.clear();
         marked_.assign(bins_.size(), 0);
         if (!moves_.empty())
         {
@@ -128,6 +130,26 @@ private:
         return lost;
     }
 
+    /// Slots for all cells that points of marked bins go to.
+    void make_slots()
+    {
+        CellBox reach = no_cells;
+        for_each_marked(
+            [&](std::uint32_t, std::uint32_t p)
+            {
+                const int i = lattice_.cell_i(key_[p]), j = lattice_.cell_j(key_[p]);
+                reach.extend({i, j, i + 1, j + 1});
+            });
+        if (with_numbers_for(slots_, reach).numbered == slots_.numbered)
+            return;
+        for (const Bin& b : bins_)
+            reach.extend({b.i, b.j, b.i + 1, b.j + 1});
+        slots_ = with_numbers_for(slots_, reach);
+        slot_.assign(slots_.cells(), -1);
+        for (std::size_t b = 0; b < bins_.size(); ++b)
+            slot_of(bins_[b]) = static_cast<std::int32_t>(b);
+    }
+
     /// Empty bins for the points that have none yet, in the order of cells.
     bool insert_new()
     {
@@ -135,9 +157,9 @@ private:
         for_each_marked(
             [&](std::uint32_t, std::uint32_t p)
             {
-                if (slot_[key_[p]] < 0)
+                if (std::int32_t& slot = slot_[place(key_[p])]; slot < 0)
                 {
-                    slot_[key_[p]] = 0;
+                    slot = 0;
                     cells.push_back(key_[p]);
                 }
             });
@@ -149,7 +171,7 @@ private:
         before_.clear();
         const auto add = [&](const Bin& bin, char is_marked, std::uint32_t number)
         {
-            slot_[lattice_.cell(bin.i, bin.j)] = static_cast<std::int32_t>(bins_.size());
+            slot_of(bin) = static_cast<std::int32_t>(bins_.size());
             bins_.push_back(bin);
             marked_.push_back(is_marked);
             before_.push_back(number);
@@ -230,7 +252,7 @@ private:
         for (std::size_t b = 0; b < bins_.size(); ++b)
         {
             const bool is_empty = bins_[b].begin == bins_[b].end;
-            slot_[lattice_.cell(bins_[b].i, bins_[b].j)] = is_empty ? -1 : static_cast<std::int32_t>(kept);
+            slot_of(bins_[b]) = is_empty ? -1 : static_cast<std::int32_t>(kept);
             if (is_empty)
                 continue;
             bins_[kept] = bins_[b];
@@ -242,7 +264,9 @@ private:
     }
 
     /// Number of the bin to which a point of a marked bin goes.
-    std::uint32_t slot(std::uint32_t p) const { return static_cast<std::uint32_t>(slot_[key_[p]]); }
+    std::uint32_t slot(std::uint32_t p) const { return static_cast<std::uint32_t>(slot_[place(key_[p])]); }
+    std::size_t place(std::uint32_t cell) const { return slots_.cell(lattice_.cell_i(cell), lattice_.cell_j(cell)); }
+    std::int32_t& slot_of(const Bin& bin) { return slot_[slots_.cell(bin.i, bin.j)]; }
 
     template <class Support>
     std::uint32_t key(const Points& points, std::size_t p) const
@@ -275,7 +299,8 @@ private:
 
     Lattice lattice_;
     std::vector<Bin> bins_;
-    std::vector<std::int32_t> slot_;  ///< number of the bin of each cell, or -1
+    Lattice slots_;                   ///< with numbers for the cells around the points
+    std::vector<std::int32_t> slot_;  ///< number of the bin of each of these, or -1
     std::vector<char> marked_;
     std::vector<std::uint32_t> marks_;   ///< numbers of the marked bins
     std::vector<std::uint32_t> key_;     ///< cell of each point of a marked bin
@@ -286,25 +311,15 @@ private:
     std::size_t size_before_ = 0;
 };
 
-/// The lattice with numbers for all that the S x S cells or nodes of bins touch. The same one if it has them already; else for a margin
-/// around them, too, so that points may go some way before it changes again: an empty part of the lattice takes no room.
+/// The lattice with numbers for all that the S x S cells or nodes of bins touch.
 template <int S>
 Lattice with_numbers_for(const Lattice& lattice, std::span<const Bins* const> bins)
 {
-    CellBox reach{lattice.nx, lattice.ny, -1, -1};
+    CellBox reach = no_cells;
     for (const Bins* b : bins)
         for (const Bin& bin : b->list())
-            reach = {std::min(reach.i0, bin.i), std::min(reach.j0, bin.j), std::max(reach.i1, bin.i + S), std::max(reach.j1, bin.j + S)};
-    reach.i1 = std::min(reach.i1, lattice.nx + 1);  // nodes have one line more than cells have columns
-    reach.j1 = std::min(reach.j1, lattice.ny + 1);
-    const CellBox& has = lattice.numbered;  // the first ring may be reached, too
-    if (reach.i0 >= has.i0 - 1 && reach.j0 >= has.j0 - 1 && reach.i1 <= has.i1 + 1 && reach.j1 <= has.j1 + 1)
-        return lattice;
-    constexpr int margin = 16;
-    Lattice other = lattice;
-    other.numbered = {std::max(reach.i0 - margin, 0), std::max(reach.j0 - margin, 0), std::min(reach.i1 + margin, lattice.nx),
-                      std::min(reach.j1 + margin, lattice.ny)};
-    return other;
+            reach.extend({bin.i, bin.j, bin.i + S, bin.j + S});
+    return with_numbers_for(lattice, reach);
 }
 
 /// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), still does; false for NaN.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <tuple>
 #include <vector>
 
@@ -26,7 +27,13 @@ struct CellBox
 {
     int i0, j0, i1, j1;
     bool operator==(const CellBox&) const = default;
+    void extend(const CellBox& other)
+    {
+        *this = {std::min(i0, other.i0), std::min(j0, other.j0), std::max(i1, other.i1), std::max(j1, other.j1)};
+    }
 };
+inline constexpr CellBox no_cells{std::numeric_limits<int>::max(), std::numeric_limits<int>::max(), std::numeric_limits<int>::min(),
+                                  std::numeric_limits<int>::min()};
 
 /// Numbers go to the cells and nodes of a part of the lattice, row by row; the arrays of a method have room for no others. One ring of
 /// cells around that part takes what a point's box spreads over the edge of the lattice, and a second, always empty one lets every node of
@@ -71,11 +78,27 @@ struct Lattice
     Vec2 node_position(std::size_t n) const { return node_position(NodeIndex{node_i(n), node_j(n)}); }
 };
 
-/// No node of it has a number, not even in a ring.
+/// Nothing but the rings around no cells has a number.
 inline Lattice without_numbers(Lattice lattice)
 {
-    lattice.numbered = {0, 0, -3, -3};
+    lattice.numbered = {0, 0, 0, 0};
     return lattice;
+}
+
+/// The lattice with numbers for a box, which may reach over its edges as far as supports do. The same one if it has them already; else for
+/// a margin around the box, too, so that points may go some way before it changes again: arrays take no room where the lattice is empty.
+inline Lattice with_numbers_for(const Lattice& lattice, CellBox reach)
+{
+    reach.i1 = std::min(reach.i1, lattice.nx + 1);  // nodes have one line more than cells have columns
+    reach.j1 = std::min(reach.j1, lattice.ny + 1);
+    const CellBox& has = lattice.numbered;  // the first ring may be reached, too
+    if (has.i0 < has.i1 && reach.i0 >= has.i0 - 1 && reach.j0 >= has.j0 - 1 && reach.i1 <= has.i1 + 1 && reach.j1 <= has.j1 + 1)
+        return lattice;
+    constexpr int margin = 16;
+    Lattice other = lattice;
+    other.numbered = {std::max(reach.i0 - margin, 0), std::max(reach.j0 - margin, 0), std::min(reach.i1 + margin, lattice.nx),
+                      std::min(reach.j1 + margin, lattice.ny)};
+    return other;
 }
 
 /// Takes nodal values to other numbers: those of the nodes that both lattices number; the other nodes have zero.

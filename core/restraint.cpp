@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 namespace testbed
 {
@@ -9,22 +10,21 @@ namespace
 {
 constexpr std::size_t worth_a_team = 64;
 
-/// What a face between two nodes gives to them to change its own velocity by dv. Without mass on both sides no soil lies at the face.
-std::array<double, 2> impulse(const Nodes& carrier, std::uint32_t low, std::uint32_t high, double share, double dv)
+/// What a face gives to its two nodes to change its own velocity by dv. Without mass on both sides no soil lies at the face.
+std::array<double, 2> impulse(const Nodes& carrier, const DrivenNodes::Pair& p, double dv)
 {
-    if (!(carrier.mass[low] > 0 && carrier.mass[high] > 0))
+    if (!(carrier.mass[p.low] > 0 && carrier.mass[p.high] > 0))
         return {0, 0};
-    const double a = 1 - share, b = share;
-    const double size = dv / (a * a / carrier.mass[low] + b * b / carrier.mass[high]);
+    const double a = 1 - p.share, b = p.share;
+    const double size = dv / (a * a / carrier.mass[p.low] + b * b / carrier.mass[p.high]);
     return {a * size, b * size};
 }
 
 /// Adds the reaction at a face to the forces f; returns it [N/m].
-template <class Pair>
-double hold_face(const Nodes& carrier, const Pair& p, std::vector<double>& f)
+double hold_face(const Nodes& carrier, const DrivenNodes::Pair& p, std::vector<double>& f)
 {
     const double a = (1 - p.share) * f[p.low] * inverse_mass(carrier, p.low) + p.share * f[p.high] * inverse_mass(carrier, p.high);
-    const auto [low, high] = impulse(carrier, p.low, p.high, p.share, -a);
+    const auto [low, high] = impulse(carrier, p, -a);
     f[p.low] += low;
     f[p.high] += high;
     return low + high;
@@ -34,15 +34,17 @@ double hold_face(const Nodes& carrier, const Pair& p, std::vector<double>& f)
 template <class Take>
 void for_each_used(const std::vector<NodeIndex>& ascending, const Lattice& lattice, const std::vector<std::uint32_t>& active, Take&& take)
 {
-    auto listed = ascending.begin();
-    for (const auto number : active)
-    {
-        const NodeIndex n{lattice.node_i(number), lattice.node_j(number)};
-        if (listed != ascending.end() && *listed < n)
-            listed = std::lower_bound(listed, ascending.end(), n);
-        if (listed != ascending.end() && *listed == n)
-            take(number);
-    }
+    const CellBox& box = lattice.numbered;
+    auto n = std::lower_bound(ascending.begin(), ascending.end(), NodeIndex{box.i0 - 1, box.j0 - 1});
+    auto place = active.begin();
+    for (; n != ascending.end() && n->j <= box.j1 + 1; ++n)
+        if (lattice.has_node(n->i, n->j))
+        {
+            const auto number = static_cast<std::uint32_t>(lattice.node(n->i, n->j));
+            place = std::lower_bound(place, active.end(), number);
+            if (place != active.end() && *place == number)
+                take(number);
+        }
 }
 }  // namespace
 
@@ -101,8 +103,7 @@ void DrivenNodes::drive(const std::vector<Restraint>& restraints, const Nodes& c
         {
             std::vector<double>& v = *velocity[p.component];
             const double face = (1 - p.share) * v[p.low] + p.share * v[p.high];
-            const auto [low, high] =
-                impulse(carrier, p.low, p.high, p.share, restraints[p.restraint].components[p.component].velocity - face);
+            const auto [low, high] = impulse(carrier, p, restraints[p.restraint].components[p.component].velocity - face);
             v[p.low] += low * inverse_mass(carrier, p.low);
             v[p.high] += high * inverse_mass(carrier, p.high);
         }

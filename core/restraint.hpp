@@ -48,16 +48,18 @@ public:
     /// The same once more at the faces, without noting them.
     void hold_faces(Nodes& nodes) const;
 
-private:
-    struct Driven
-    {
-        std::uint32_t node;
-        std::uint16_t restraint, component;
-    };
+    /// A FacePair by the numbers of its nodes.
     struct Pair
     {
         std::uint32_t low, high;
         double share;
+        std::uint16_t restraint, component;
+    };
+
+private:
+    struct Driven
+    {
+        std::uint32_t node;
         std::uint16_t restraint, component;
     };
     /// The nodes of some restraints, and the pairs of the last of them.

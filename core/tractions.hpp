@@ -72,9 +72,8 @@ private:
     static void give(const Lattice& lattice, const Vec2& place, const Vec2& force, Nodes& nodes)
     {
         const double cx = (place[0] - lattice.origin[0]) / lattice.cell_size, cy = (place[1] - lattice.origin[1]) / lattice.cell_size;
-        const CellBox& cells = lattice.numbered;
-        if (!(cx >= cells.i0 - 1 && cx < cells.i1 + 1 && cy >= cells.j0 - 1 && cy < cells.j1 + 1))
-            return;  // far from the point, or the point itself will be told to have left
+        if (!(cx >= -1 && cx < lattice.nx + 1 && cy >= -1 && cy < lattice.ny + 1))
+            return;  // the point itself will be told to have left
         const int i = static_cast<int>(std::floor(cx)), j = static_cast<int>(std::floor(cy));
         const double a = cx - i, b = cy - j;
         std::array<std::size_t, 4> node{};
@@ -82,6 +81,8 @@ private:
         double total = 0;
         for (int k = 0; k < 4; ++k)
         {
+            if (!lattice.has_node(i + (k & 1), j + (k >> 1)))
+                continue;
             node[k] = lattice.node(i + (k & 1), j + (k >> 1));
             weight[k] = nodes.mass[node[k]] > 0 ? ((k & 1) ? a : 1 - a) * ((k >> 1) ? b : 1 - b) : 0;
             total += weight[k];

@@ -167,7 +167,6 @@ private:
                 for (const auto c : grid_.gather.active())  // the nodes around a cell that goes out of use may stay
                     hourglass_x_[c] = hourglass_y_[c] = 0;
             left_ = grid_.rebuild<S>(bins);
-            gradients_over_ = 0;
             was_rebuilt_ = true;
             sums_.update(grid_.lattice, bodies_);
         }
