@@ -95,7 +95,8 @@ fix = "x"
     EXPECT_EQ(vx[lattice.node(0, 3)], 0);
     EXPECT_EQ(vy[lattice.node(0, 3)], 1);
     EXPECT_EQ(vx[lattice.node(3, 3)], 1);
-    EXPECT_EQ(vx[lattice.node(-1, 3)], 0);  // the ring around the lattice, too
+    for (const auto& [i, j] : {std::pair{-1, 3}, {0, -1}, {0, lattice.ny + 1}})  // the ring around the lattice, too
+        EXPECT_EQ(vx[lattice.node(i, j)], 0) << i << ' ' << j;
     nodes.set_active({});
     std::fill(vy.begin(), vy.end(), 1.0);
     ops.restrain(lattice, nodes, vx, vy);

@@ -180,6 +180,19 @@ TEST(Wall, OwnsWhatItDrives)
     EXPECT_EQ(f.column(3)[6], -2);
 }
 
+/// The same for a node within a smooth wall, whose faces lie elsewhere.
+TEST(Wall, LaterOnesDriveTheNodesWithin)
+{
+    const std::string block = "[[wall]]\nname = \"block\"\nmin = [0.0, 2.3]\nmax = [4.0, 3.8]\nmotion = \"smooth\"\nfix = \"y\"\n";
+    const std::string plate = "[[wall]]\nname = \"plate\"\nmin = [0.0, 3.0]\nmax = [4.0, 3.0]\nfix = \"y\"\n";
+    Fixture f(block + plate);
+    f.ops.begin_step(0, 0.1);
+    f.nodes.fy[f.lattice.node(3, 6)] = 5;
+    f.ops.apply_forces(f.lattice, f.nodes, 0);
+    EXPECT_EQ(f.ops.records()[0].reaction[1], 0);
+    EXPECT_EQ(f.ops.records()[1].reaction[1], -5);
+}
+
 /// A smooth wall finds driven what earlier restraints drive, and a later one has the last word at a node of its face, whose force
 /// is then its reaction. Faces between y = 2.5 and 3, share 0.4 below; the second wall holds y = 3.
 TEST(Wall, LaterOnesDriveTheNodesOfAFace)
