@@ -6,9 +6,9 @@
 #include "core/run.hpp"
 #include "lpfdm/lpfdm.hpp"
 #include "mpm/mpm.hpp"
+#include "tests/scenes.hpp"
 
 #include <fmt/core.h>
-#include <fstream>
 #include <gtest/gtest.h>
 
 using namespace testbed;
@@ -260,9 +260,7 @@ traction = ["50", "0"]
                                  "internal_length = 0.8\nover_nonlocal = 1.2\n";
     const auto after = [](const std::string& text, const std::string& method, const std::vector<std::string>& overrides)
     {
-        const std::string path = testing::TempDir() + "empty_lattice.toml";
-        std::ofstream(path) << text;
-        const Scene s = load_scene(path, method, overrides).scene;
+        const Scene s = test::load(text, method, overrides);
         const auto solver = find_variant(method).family == "mpm" ? make_mpm(s) : make_lpfdm(s);
         for (int n = 0; n < 350; ++n)
         {
@@ -303,42 +301,16 @@ traction = ["50", "0"]
 /// A body of one cell in the corner of the lattice has room in the arrays, too.
 TEST(EmptyLattice, HoldsASingleCell)
 {
-    const std::string path = testing::TempDir() + "single_cell.toml";
-    std::ofstream(path) << R"toml(
-[grid]
-size = [4.0, 4.0]
-cell_size = 1.0
-[time]
-end = 0.1
-dt = 0.01
-[body_force]
-acceleration = ["0", "-1"]
-[[material]]
-name = "soil"
-law = "linear_elastic"
-density = 1000.0
-youngs_modulus = 1e5
-poissons_ratio = 0.3
-[[body]]
-name = "cell"
-material = "soil"
-shape = "box"
-min = [0.0, 0.0]
-max = [1.0, 1.0]
-points_per_cell = 2
-[[boundary]]
-name = "base"
-where = "y <= 0"
-fix = "xy"
-)toml";
+    const std::string scene = test::soil_block({0, 0}, {0.5, 0.5}) + "[body_force]\nacceleration = [\"0\", \"-1\"]\n" +
+                              "[[boundary]]\nname = \"base\"\nwhere = \"y <= 0\"\nfix = \"xy\"\n";
     for (const std::string method : {"lpfdm-2000", "lpfdm"})
     {
-        const Scene s = load_scene(path, method, {"lpfdm.hourglass=0.1"}).scene;
+        const Scene s = test::load(scene, method, {"lpfdm.hourglass=0.1"});
         const auto solver = make_lpfdm(s);
         for (int n = 0; n < 10; ++n)
         {
-            solver->prepare(n * 0.01, 0.01);
-            solver->advance(0.01);
+            solver->prepare(n * 1e-3, 1e-3);
+            solver->advance(1e-3);
         }
         EXPECT_LT(solver->bodies()[0].points.syy[0], 0) << method;
     }
