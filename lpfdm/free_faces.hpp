@@ -19,6 +19,11 @@ namespace testbed
 class FreeFaces
 {
 public:
+    /// A node with less than this share of a full node's mass has no velocity of its own: what little stress it sees tells nothing of the
+    /// body, and pushes it to any speed.
+    static constexpr double sliver = 1e-3;
+    double full_mass = 0;  ///< of a node with four full cells [kg/m]
+
     explicit FreeFaces(std::size_t nodes) { resize(nodes); }
     void resize(std::size_t nodes)
     {
@@ -139,11 +144,13 @@ public:
     /// Velocity that mass brings to a node where the node's own is v. What arrives comes from between the node and its neighbours: unless
     /// the node had next to no mass, and no velocity to speak of, the extrapolation goes no further from their mean than v does. Else a
     /// curved profile would win energy whenever mass arrives, and a body that oscillates grow.
-    Vec2 arriving(const LpfdmGrid& grid, const std::vector<double>& mass_before, std::uint32_t node, double scale, const Vec2& v) const
+    /// @param is_new 1 for a node without a velocity of its own
+    Vec2 arriving(const LpfdmGrid& grid, const std::vector<double>* mass_before, std::uint32_t node, double scale, const Vec2& v,
+                  double is_new) const
     {
-        const Around near = around(grid, &mass_before, node, scale);
+        const Around near = around(grid, mass_before, node, scale);
         const double own = std::hypot(v[0] - near.mean[0], v[1] - near.mean[1]), beyond = std::hypot(near.beyond[0], near.beyond[1]);
-        const double limit = beyond > own ? own / beyond : 1, is_new = std::max(0.0, 1 - mass_before[node] / grid.nodes.mass[node]);
+        const double limit = beyond > own ? own / beyond : 1;
         const double factor = limit + (1 - limit) * is_new;
         return {near.mean[0] + factor * near.beyond[0], near.mean[1] + factor * near.beyond[1]};
     }
@@ -178,8 +185,8 @@ private:
         return sum;
     }
 
-    std::vector<double> one_sided_;            ///< 1 at nodes of faces_
-    std::vector<double> xx_, yy_, xy_, yx_;    ///< gradient of the increment at nodes
+    std::vector<double> one_sided_;          ///< 1 at nodes of faces_
+    std::vector<double> xx_, yy_, xy_, yx_;  ///< gradient of the increment at nodes
     std::vector<std::uint32_t> faces_, ahead_;
 };
 }  // namespace testbed

@@ -36,6 +36,10 @@ public:
         for (const Body& body : bodies_)
             wave_speed_ =
                 std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
+        if (faces_)
+            for (const Body& body : bodies_)
+                faces_->full_mass = std::max(faces_->full_mass, body.points.mass / body.points.initial_volume * grid_.lattice.cell_size *
+                                                                    grid_.lattice.cell_size);
         rebuild();
         set_initial_velocity(scene);
     }
@@ -113,8 +117,9 @@ public:
                    std::size_t first_bin = 0;
                    for (Body& body : bodies_)
                    {
-                       moved_ |= std::visit(
-                           [&](const auto& law) { return move_points<Support>(grid_, body, law, increment_, dt, sums_.of(first_bin)); }, body.material);
+                       moved_ |= std::visit([&](const auto& law)
+                                            { return move_points<Support>(grid_, body, law, increment_, dt, sums_.of(first_bin)); },
+                                            body.material);
                        first_bin += body.bins.list().size();
                    }
                });
