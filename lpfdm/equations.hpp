@@ -137,27 +137,22 @@ inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& 
         });
 }
 
-/// Where the points of a bin are at theta of the step, to first order about the bin's middle node: there the nodal velocity, whose
-/// gradient jumps at lattice lines, moves and strains them. Taken at the start of the step, the jumps would act half a step late, and an
+/// Where the middle node of a bin meets its points when a share theta of the step has passed: K on the way x + alpha y of points, which the
+/// displacement to first order about the node takes to A (x + alpha y - K), and likewise across. There the nodal velocity, whose gradient
+/// jumps at lattice lines, moves and strains them: at the start of the step the jumps would act half a step late, and an
 /// oscillation move points against their boxes, first order in dt.
-struct HalfStep
+struct MidStep
 {
-    Gradient<> gradient;  ///< of the displacement
-    Vec2 shift;           ///< of the middle node [cells]
+    Vec2 stretch{1, 1}, slope{0, 0}, middle{1, 1};  ///< A, alpha, K in x and y
 
-    TESTBED_INLINE Corner operator()(const Corner& c) const
+    MidStep() = default;
+    /// @param g gradient of the step's displacement @param u displacement of the middle node [cells]
+    TESTBED_INLINE MidStep(double theta, const Gradient<>& g, const Vec2& u)
+        : stretch{1 + theta * g.xx, 1 + theta * g.yy},
+          slope{theta * g.xy / stretch[0], theta * g.yx / stretch[1]},
+          middle{1 + slope[0] - theta * u[0] / stretch[0], 1 + slope[1] - theta * u[1] / stretch[1]}
     {
-        const Pack one(1.0), dx = c.ax + Pack(0.5) * c.wx - one, dy = c.ay + Pack(0.5) * c.wy - one;
-        const Pack grow_x = Pack(0.5) * c.wx * Pack(gradient.xx), grow_y = Pack(0.5) * c.wy * Pack(gradient.yy);
-        return {c.ax + Pack(shift[0]) + Pack(gradient.xx) * dx + Pack(gradient.xy) * dy - grow_x,
-                c.ay + Pack(shift[1]) + Pack(gradient.yx) * dx + Pack(gradient.yy) * dy - grow_y, c.wx + grow_x + grow_x,
-                c.wy + grow_y + grow_y};
     }
-};
-/// A point without a box is moved from where it is.
-struct NoHalfStep
-{
-    TESTBED_INLINE const Corner& operator()(const Corner& c) const { return c; }
 };
 
 /// What is constant in a bin: the gradient of the increment averaged over a box, and the velocity of its (S+1) x (S+1) nodes, where it
@@ -169,7 +164,7 @@ struct BinMotion
     std::array<Gradient<>, S * S> coefficients;  ///< of 1, a, b and a b, with the shares a and b of a box in the next cells
     const double *vx, *vy;                       ///< of the bin's first node
     std::size_t stride;
-    [[no_unique_address]] std::conditional_t<S == 2, HalfStep, NoHalfStep> half;
+    MidStep mid;  ///< for points with a box; others are moved from where they are
 
     TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin, double theta, double dt)
         : vx(&grid.nodes.vx[grid.lattice.node(bin.i, bin.j)]),
@@ -183,26 +178,44 @@ struct BinMotion
             coefficients[1] = cell(1, 0) - cell(0, 0);
             coefficients[2] = cell(0, 1) - cell(0, 0);
             coefficients[3] = cell(1, 1) - cell(1, 0) - coefficients[2];
-            const Gradient<> mean = coefficients[0] + 0.5 * (coefficients[1] + coefficients[2]) + 0.25 * coefficients[3];
-            const double scale = theta * dt / grid.lattice.cell_size;
-            half = {theta * mean, {scale * vx[stride + 1], scale * vy[stride + 1]}};
+            const double scale = dt / grid.lattice.cell_size;
+            mid = MidStep(theta, coefficients[0] + 0.5 * (coefficients[1] + coefficients[2]) + 0.25 * coefficients[3],
+                          {scale * vx[stride + 1], scale * vy[stride + 1]});
         }
     }
-    TESTBED_INLINE Gradient<Pack> gradient(const Corner& c) const
+    /// Displacement gradient and displacement of the points at c over the step.
+    TESTBED_INLINE Gradient<Pack> operator()(const Corner& c, double dt, Pack& x, Pack& y) const
     {
         Gradient<Pack> d = Pack(1.0) * coefficients[0];
-        if constexpr (S == 2)
+        if constexpr (S == 1)
+            displace({Pack(1.0) - c.ax, c.ax}, {Pack(1.0) - c.ay, c.ay}, dt, x, y);
+        else
         {
-            const Weights<Support> weights({min(c.ax, Pack(1.0)), min(c.ay, Pack(1.0)), c.wx, c.wy});  // at mid-step a box may be beyond
-            const Pack a = weights.x[1], b = weights.y[1];
+            const Pack half(0.5), hx = half * c.wx, hy = half * c.wy, cx = c.ax + hx, cy = c.ay + hy;
+            const Pack beyond_x = cx + Pack(mid.slope[0]) * cy - Pack(mid.middle[0]),
+                       beyond_y = cy + Pack(mid.slope[1]) * cx - Pack(mid.middle[1]);
+            const auto inverse = inverse_widths(c);
+            const Pack a = share(beyond_x, hx, inverse[0]), b = share(beyond_y, hy, inverse[1]);
             d = d + a * coefficients[1] + b * coefficients[2] + (a * b) * coefficients[3];
+            displace(hat(Pack(mid.stretch[0]) * beyond_x), hat(Pack(mid.stretch[1]) * beyond_y), dt, x, y);
         }
         return d;
     }
-    TESTBED_INLINE void displace(const Corner& c, double dt, Pack& x, Pack& y) const
+
+private:
+    /// Of a box in the next cell, with its middle this far beyond the line; at mid-step it may lie in either.
+    TESTBED_INLINE static Pack share(Pack beyond, Pack half, Pack inverse)
     {
-        const auto wx = hat(c.ax + Pack(0.5) * c.wx);
-        auto wy = hat(c.ay + Pack(0.5) * c.wy);
+        return min(max(beyond + half, Pack(0.0)) * inverse, Pack(1.0));
+    }
+    /// Bilinear weights of three nodes, this far beyond the middle one [cells].
+    TESTBED_INLINE static std::array<Pack, 3> hat(Pack beyond)
+    {
+        const Pack low = max(-beyond, Pack(0.0)), high = max(beyond, Pack(0.0));
+        return {low, Pack(1.0) - low - high, high};
+    }
+    TESTBED_INLINE void displace(const std::array<Pack, S + 1>& wx, std::array<Pack, S + 1> wy, double dt, Pack& x, Pack& y) const
+    {
         for (Pack& w : wy)
             w *= Pack(dt);
         for (int j = 0; j <= S; ++j)
@@ -215,17 +228,6 @@ struct BinMotion
             }
             x += wy[j] * rx;
             y += wy[j] * ry;
-        }
-    }
-    /// Bilinear weights of the nodes 0..S at xi in [0, S).
-    TESTBED_INLINE static std::array<Pack, S + 1> hat(Pack xi)
-    {
-        if constexpr (S == 1)
-            return {Pack(1.0) - xi, xi};
-        else
-        {
-            const Pack low = max(Pack(1.0) - xi, Pack(0.0)), high = max(xi - Pack(1.0), Pack(0.0));
-            return {low, Pack(1.0) - low - high, high};
         }
     }
 };
@@ -249,9 +251,7 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, const Strain
                                    [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                                    {
                                        Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
-                                       const Corner c = motion.half(frame.corner<Support>(q, p, lanes, x, y));
-                                       const Gradient<Pack> d = motion.gradient(c);
-                                       motion.displace(c, dt, x, y);
+                                       const Gradient<Pack> d = motion(frame.corner<Support>(q, p, lanes, x, y), dt, x, y);
                                        law.update(q, p, lanes, d);
                                        stretch<Support>(q, p, lanes, increment, d);
                                        lanes.store(&q.x[p], x);

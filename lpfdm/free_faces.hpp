@@ -31,7 +31,8 @@ public:
             values->assign(nodes, 0.0);
     }
 
-    /// Finds the nodes at free faces, from the cells' masses.
+    /// Finds the nodes at free faces, from the cells' masses. What is held in the direction across the face, as at a wall, has no
+    /// convection from there.
     void find(const LpfdmGrid& grid)
     {
         const Pack two(2.0);
@@ -41,16 +42,23 @@ public:
                 const auto mass = [&](int k) { return lanes.load(&grid.cells.mass[grid.around(first_cell, k)]); };
                 const Pack m0 = mass(0), m1 = mass(1), m2 = mass(2), m3 = mass(3);
                 const Pack right = m0 + m2, left = m1 + m3, up = m0 + m1, down = m2 + m3;
-                const Mask is_face = two * min(left, right) < max(left, right) || two * min(down, up) < max(down, up);
+                const Pack vx = lanes.load(&grid.nodes.vx[n]), vy = lanes.load(&grid.nodes.vy[n]), none(0.0);
+                const Mask is_face = (two * min(left, right) < max(left, right) && vx != none) ||
+                                     (two * min(down, up) < max(down, up) && vy != none) || left + right < Pack(4 * sliver * full_mass);
                 lanes.store(&one_sided_[n], select(is_face, Pack(1.0), Pack(0.0)));
             });
         faces_.clear();
         ahead_.clear();
-        for (const auto n : grid.nodes.active())
-            if (!(grid.nodes.mass[n] > 0))
-                ahead_.push_back(n);
-            else if (one_sided_[n] > 0)
-                faces_.push_back(n);
+        for (const Run& run : grid.nodes.runs())
+            for_each_pack(
+                run.begin, run.begin + run.count,
+                [&](std::size_t first, const auto& lanes)
+                {
+                    if (const auto is_face = lanes.keep(lanes.load(&one_sided_[first]) > Pack(0.0)); stdx::any_of(is_face))
+                        for (std::size_t k = 0; k < pack_size; ++k)
+                            if (is_face[k])
+                                (grid.nodes.mass[first + k] > 0 ? faces_ : ahead_).push_back(static_cast<std::uint32_t>(first + k));
+                });
     }
 
     /// Keeps the gradient at each node. @param gradient (first cell, node, lanes) -> gradient of the increment at nodes
