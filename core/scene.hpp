@@ -250,20 +250,26 @@ struct ReportSpec
 struct LpfdmSpec
 {
     std::string support = "domain", convection = "two_sided", frontier = "arrival";
-    double hourglass = 0.05;
+    double hourglass = 0.05, volume_cap = 0;
 
     template <class V>
     void describe(V& v)
     {
         v.choice("support", support, {"point", "domain"},
                  "point: a point belongs to one cell; domain: its box spreads over the cells that it overlaps");
-        v.choice("convection", convection, {"upwind", "central", "two_sided", "none"},
-                 "form of eq. (13); two_sided: central, from the next layer of cells where one side has no material, half of it before and half "
-                 "after the forces, strain and position at the middle of the step");
-        v.choice("frontier", frontier, {"extrapolate", "literal", "arrival"},
-                 "velocity of nodes reached for the first time: mean of neighbours, or zero; arrival: whenever mass arrives at a free face, "
-                 "it brings its velocity");
+        v.choice(
+            "convection", convection, {"upwind", "central", "two_sided", "none"},
+            "form of eq. (13); two_sided: central, from the next layer of cells where one side has no material, half of it before and half "
+            "after the forces, strain and position at the middle of the step");
+        v.choice(
+            "frontier", frontier, {"extrapolate", "literal", "arrival"},
+            "velocity of nodes reached for the first time: mean of neighbours, or zero; arrival: whenever mass arrives at a free face, "
+            "it brings its velocity");
         v.optional("hourglass", hourglass, "-", "coefficient chi of the viscous hourglass force, at most 0.5; 0 leaves it out");
+        v.optional(
+            "volume_cap", volume_cap, "-",
+            "support = \"point\": stress counts over at most this many times a point's initial volume: one alone in its cell, grown by "
+            "tension, has more stiffness than mass; 0 sets no limit");
     }
 };
 

@@ -453,6 +453,10 @@ void check_scene(const Scene& scene, Problems& problems)
         problems.add("output.history", "must not be negative");
     if (scene.output.snapshots < 0 || scene.output.snapshots > 9999)
         problems.add("output.snapshots", "between 0 and 9999 is asked");
+    if (!(scene.lpfdm.volume_cap == 0 || scene.lpfdm.volume_cap >= 1))
+        problems.add("lpfdm.volume_cap", fmt::format("0 (no limit) or at least 1 is asked, not {}", scene.lpfdm.volume_cap));
+    else if (scene.lpfdm.volume_cap > 0 && scene.lpfdm.support != "point")
+        problems.add("lpfdm.volume_cap", "only for support = \"point\"");
     if (scene.lpfdm.hourglass < 0 || scene.lpfdm.hourglass > 0.5)
         problems.add("lpfdm.hourglass", fmt::format("must lie in [0, 0.5], beyond that it is unstable at the critical time step; not {}",
                                                     scene.lpfdm.hourglass));

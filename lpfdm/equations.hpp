@@ -24,7 +24,10 @@ public:
     {
         const Points& q = body.points;
         const Weights<Support> weights(c);
-        const Pack v = lanes.keep(volume<Support>(q, p, lanes)), pressure(body.confinement);
+        Pack v = lanes.keep(volume<Support>(q, p, lanes));
+        if constexpr (S == 1)
+            v = min(v, Pack(body.counted_volume));
+        const Pack pressure(body.confinement);
         const Pack xx = v * (lanes.load(&q.sxx[p]) + pressure), yy = v * (lanes.load(&q.syy[p]) + pressure), xy = v * lanes.load(&q.sxy[p]);
         for (int j = 0; j < S; ++j)
             for (int i = 0; i < S; ++i)

@@ -37,9 +37,10 @@ public:
             wave_speed_ =
                 std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
         if (faces_)
-            for (const Body& body : bodies_)
-                faces_->full_mass = std::max(faces_->full_mass, body.points.mass / body.points.initial_volume * grid_.lattice.cell_size *
-                                                                    grid_.lattice.cell_size);
+            faces_->full_mass = lightest_full_node();
+        if (options_.volume_cap > 0)
+            for (Body& body : bodies_)
+                body.counted_volume = options_.volume_cap * body.points.initial_volume;
         rebuild();
         set_initial_velocity(scene);
     }
@@ -167,6 +168,15 @@ public:
 
 private:
     static constexpr int S = Support::S;
+
+    /// Mass of a node among four full cells of the lightest body [kg/m].
+    double lightest_full_node() const
+    {
+        double density = std::numeric_limits<double>::infinity();
+        for (const Body& body : bodies_)
+            density = std::min(density, body.points.mass / body.points.initial_volume);
+        return density * grid_.lattice.cell_size * grid_.lattice.cell_size;
+    }
 
     /// Points changed their cells: sorts them and finds the cells and nodes in use.
     void rebuild()
