@@ -15,6 +15,17 @@ struct Body
     Bins bins;
     double confinement = 0;      ///< pressure on free surfaces: forces come from the stress beyond it [Pa]
     double truncated_share = 0;  ///< of the random strengths drawn
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.group("body/" + name,
+                [&]
+                {
+                    points.state(a);
+                    a.group("bins", [&] { bins.state(a); });
+                });
+    }
 };
 
 /// What a method asks of each point beyond position and stress.
