@@ -83,6 +83,10 @@ struct Lattice
     {
         return i >= numbered.i0 - 1 && i <= numbered.i1 + 1 && j >= numbered.j0 - 1 && j <= numbered.j1 + 1;
     }
+    bool has_cell(int i, int j) const
+    {
+        return i >= numbered.i0 - 2 && i <= numbered.i1 + 1 && j >= numbered.j0 - 2 && j <= numbered.j1 + 1;
+    }
     int cell_i(std::size_t c) const { return static_cast<int>(c % cell_stride()) - 2 + numbered.i0; }
     int cell_j(std::size_t c) const { return static_cast<int>(c / cell_stride()) - 2 + numbered.j0; }
     int node_i(std::size_t n) const { return static_cast<int>(n % node_stride()) - 1 + numbered.i0; }

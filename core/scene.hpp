@@ -249,7 +249,7 @@ struct ReportSpec
 
 struct LpfdmSpec
 {
-    std::string support = "domain", convection = "central", frontier = "extrapolate";
+    std::string support = "domain", convection = "two_sided", frontier = "arrival";
     double hourglass = 0.05;
 
     template <class V>
@@ -257,16 +257,19 @@ struct LpfdmSpec
     {
         v.choice("support", support, {"point", "domain"},
                  "point: a point belongs to one cell; domain: its box spreads over the cells that it overlaps");
-        v.choice("convection", convection, {"upwind", "central", "none"}, "form of eq. (13)");
-        v.choice("frontier", frontier, {"extrapolate", "literal"},
-                 "velocity of nodes reached for the first time: mean of neighbours, or zero");
+        v.choice("convection", convection, {"upwind", "central", "two_sided", "none"},
+                 "form of eq. (13); two_sided: central, from the next layer of cells where one side has no material, half of it before and half "
+                 "after the forces, strain and position at the middle of the step");
+        v.choice("frontier", frontier, {"extrapolate", "literal", "arrival"},
+                 "velocity of nodes reached for the first time: mean of neighbours, or zero; arrival: whenever mass arrives at a free face, "
+                 "it brings its velocity");
         v.optional("hourglass", hourglass, "-", "coefficient chi of the viscous hourglass force, at most 0.5; 0 leaves it out");
     }
 };
 
 struct MpmSpec
 {
-    std::string shape = "linear", scheme = "musl", strain = "four_point";
+    std::string shape = "linear", scheme = "musl", strain = "four_point", increment = "midpoint";
     double flip = 1;
 
     template <class V>
@@ -275,6 +278,8 @@ struct MpmSpec
         v.choice("shape", shape, {"linear", "bspline", "cpgimp"}, "nodal shape functions as seen by the points");
         v.choice("scheme", scheme, {"usl", "usf", "musl"}, "stress update last, first, or last with remapped velocity");
         v.choice("strain", strain, {"four_point", "b_bar"}, "strain at each point, or with the cell's mean volumetric strain");
+        v.choice("increment", increment, {"midpoint", "forward"},
+                 "strain over the configuration at the middle of the step, second order, or at its start, first order");
         v.optional("flip", flip, "-", "share of FLIP in the velocity update, the rest is PIC; in [0, 1]");
     }
 };

@@ -4,6 +4,7 @@
 /// `half_width` [cells] between the corner and the point.
 
 #include "core/body.hpp"
+#include "core/kinematics.hpp"
 #include "core/simd.hpp"
 
 namespace testbed
@@ -143,18 +144,17 @@ TESTBED_INLINE inline Pack volume(const Points& q, std::size_t p, const Lanes& l
         return lanes.load(&q.volume[p]);
 }
 
-/// Volume, or box, of a pack of points after the displacement gradient increment d.
+/// Volume, or box, of a pack of points after the strain increment d.
 template <class Support, class Lanes>
-TESTBED_INLINE inline void stretch(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d)
+TESTBED_INLINE inline void stretch(Points& q, std::size_t p, const Lanes& lanes, const StrainIncrement& increment, const Gradient<Pack>& d)
 {
-    const Pack one(1.0);
     if constexpr (Support::has_box)
     {
-        lanes.store(&q.half_x[p], lanes.load(&q.half_x[p]) * (one + d.xx));
-        lanes.store(&q.half_y[p], lanes.load(&q.half_y[p]) * (one + d.yy));
+        lanes.store(&q.half_x[p], lanes.load(&q.half_x[p]) * increment.stretch(d.xx));
+        lanes.store(&q.half_y[p], lanes.load(&q.half_y[p]) * increment.stretch(d.yy));
     }
     else
-        lanes.store(&q.volume[p], lanes.load(&q.volume[p]) * (one + d.trace()));
+        lanes.store(&q.volume[p], lanes.load(&q.volume[p]) * increment.stretch(d.trace()));
 }
 
 /// Adds Q quantities of the points of each bin, weighted, to the bin's S x S blocks.

@@ -137,6 +137,29 @@ inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& 
         });
 }
 
+/// Where the points of a bin are at theta of the step, to first order about the bin's middle node: there the nodal velocity, whose
+/// gradient jumps at lattice lines, moves and strains them. Taken at the start of the step, the jumps would act half a step late, and an
+/// oscillation move points against their boxes, first order in dt.
+struct HalfStep
+{
+    Gradient<> gradient;  ///< of the displacement
+    Vec2 shift;           ///< of the middle node [cells]
+
+    TESTBED_INLINE Corner operator()(const Corner& c) const
+    {
+        const Pack one(1.0), dx = c.ax + Pack(0.5) * c.wx - one, dy = c.ay + Pack(0.5) * c.wy - one;
+        const Pack grow_x = Pack(0.5) * c.wx * Pack(gradient.xx), grow_y = Pack(0.5) * c.wy * Pack(gradient.yy);
+        return {c.ax + Pack(shift[0]) + Pack(gradient.xx) * dx + Pack(gradient.xy) * dy - grow_x,
+                c.ay + Pack(shift[1]) + Pack(gradient.yx) * dx + Pack(gradient.yy) * dy - grow_y, c.wx + grow_x + grow_x,
+                c.wy + grow_y + grow_y};
+    }
+};
+/// A point without a box is moved from where it is.
+struct NoHalfStep
+{
+    TESTBED_INLINE const Corner& operator()(const Corner& c) const { return c; }
+};
+
 /// What is constant in a bin: the gradient of the increment averaged over a box, and the velocity of its (S+1) x (S+1) nodes, where it
 /// lies: copies would take registers that the loop over the points has no more.
 template <class Support>
@@ -146,8 +169,9 @@ struct BinMotion
     std::array<Gradient<>, S * S> coefficients;  ///< of 1, a, b and a b, with the shares a and b of a box in the next cells
     const double *vx, *vy;                       ///< of the bin's first node
     std::size_t stride;
+    [[no_unique_address]] std::conditional_t<S == 2, HalfStep, NoHalfStep> half;
 
-    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin)
+    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin, double theta, double dt)
         : vx(&grid.nodes.vx[grid.lattice.node(bin.i, bin.j)]),
           vy(&grid.nodes.vy[grid.lattice.node(bin.i, bin.j)]),
           stride(grid.lattice.node_stride())
@@ -159,6 +183,9 @@ struct BinMotion
             coefficients[1] = cell(1, 0) - cell(0, 0);
             coefficients[2] = cell(0, 1) - cell(0, 0);
             coefficients[3] = cell(1, 1) - cell(1, 0) - coefficients[2];
+            const Gradient<> mean = coefficients[0] + 0.5 * (coefficients[1] + coefficients[2]) + 0.25 * coefficients[3];
+            const double scale = theta * dt / grid.lattice.cell_size;
+            half = {theta * mean, {scale * vx[stride + 1], scale * vy[stride + 1]}};
         }
     }
     TESTBED_INLINE Gradient<Pack> gradient(const Corner& c) const
@@ -166,7 +193,7 @@ struct BinMotion
         Gradient<Pack> d = Pack(1.0) * coefficients[0];
         if constexpr (S == 2)
         {
-            const Weights<Support> weights(c);
+            const Weights<Support> weights({min(c.ax, Pack(1.0)), min(c.ay, Pack(1.0)), c.wx, c.wy});  // at mid-step a box may be beyond
             const Pack a = weights.x[1], b = weights.y[1];
             d = d + a * coefficients[1] + b * coefficients[2] + (a * b) * coefficients[3];
         }
@@ -207,7 +234,7 @@ struct BinMotion
 /// sums of its bins (`sums`, from the body's first on) for the next step. Returns whether a point left its bin: its sums are then no longer
 /// right.
 template <class Support, class Law>
-bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, double* sums)
+bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, const StrainIncrement& increment, double dt, double* sums)
 {
     Points& q = body.points;
     Bins& sorted = body.bins;
@@ -217,16 +244,16 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, d
                  [&](std::size_t b) TESTBED_FLATTEN
                  {
                      const BinFrame frame(grid.lattice, bins[b]);
-                     const BinMotion<Support> motion(grid, bins[b]);
+                     const BinMotion<Support> motion(grid, bins[b], increment.theta, dt);
                      for_each_pack(bins[b].begin, bins[b].end,
                                    [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                                    {
                                        Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
-                                       const Corner c = frame.corner<Support>(q, p, lanes, x, y);
+                                       const Corner c = motion.half(frame.corner<Support>(q, p, lanes, x, y));
                                        const Gradient<Pack> d = motion.gradient(c);
                                        motion.displace(c, dt, x, y);
                                        law.update(q, p, lanes, d);
-                                       stretch<Support>(q, p, lanes, d);
+                                       stretch<Support>(q, p, lanes, increment, d);
                                        lanes.store(&q.x[p], x);
                                        lanes.store(&q.y[p], y);
                                    });

@@ -21,9 +21,12 @@ public:
           bodies_(
               make_bodies(scene, make_lattice(scene.grid), {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
           node_ops_(scene, make_lattice(scene.grid)),
-          was_active_(grid_.lattice.nodes(), 0),
-          options_(scene.lpfdm)
+          mass_before_(grid_.lattice.nodes(), 0),
+          options_(scene.lpfdm),
+          increment_{scene.lpfdm.convection == "two_sided" ? 0.5 : 0.0}
     {
+        if (options_.convection == "two_sided")
+            faces_.emplace(grid_.lattice.nodes());
         if (scene.body_force)
             body_force_.emplace(*scene.body_force, scene.expression_constants());
         if (!scene.tractions.empty())
@@ -33,6 +36,10 @@ public:
         for (const Body& body : bodies_)
             wave_speed_ =
                 std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
+        if (faces_)
+            for (const Body& body : bodies_)
+                faces_->full_mass = std::max(faces_->full_mass, body.points.mass / body.points.initial_volume * grid_.lattice.cell_size *
+                                                                    grid_.lattice.cell_size);
         rebuild();
         set_initial_velocity(scene);
     }
@@ -59,6 +66,7 @@ public:
                {
                    extend_to_frontier();
                    convect_velocity(dt);
+                   keep_mass();
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         if (options_.hourglass > 0)
@@ -86,6 +94,16 @@ public:
                    accelerate(nodes_, started_ ? dt : 0.5 * dt);
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
+        if (faces_)
+            timer_("convection (13)",
+                   [&]
+                   {
+                       cell_gradients(grid_, dt);
+                       if (!started_)
+                           faces_->find(grid_);
+                       convect(grid_, *faces_, dt, 0.5, nullptr);
+                       node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
+                   });
         started_ = true;
         timer_("cell strain (5)",
                [&]
@@ -99,8 +117,9 @@ public:
                    std::size_t first_bin = 0;
                    for (Body& body : bodies_)
                    {
-                       moved_ |= std::visit(
-                           [&](const auto& law) { return move_points<Support>(grid_, body, law, dt, sums_.of(first_bin)); }, body.material);
+                       moved_ |= std::visit([&](const auto& law)
+                                            { return move_points<Support>(grid_, body, law, increment_, dt, sums_.of(first_bin)); },
+                                            body.material);
                        first_bin += body.bins.list().size();
                    }
                });
@@ -138,7 +157,7 @@ public:
     std::size_t active_cells() const override { return grid_.gather.active().size(); }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + grid_.bytes() + was_active_.capacity() * sizeof(double) + sums_.bytes() +
+        return bytes_of(bodies_) + grid_.bytes() + mass_before_.capacity() * sizeof(double) + sums_.bytes() +
                (workspace_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity()) * sizeof(double) +
                cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
     }
@@ -227,8 +246,10 @@ private:
 
     void renumber(const Lattice& to)
     {
-        testbed::renumber(was_active_, grid_.lattice, to);
+        testbed::renumber(mass_before_, grid_.lattice, to);
         grid_.renumber(to);
+        if (faces_)
+            faces_->resize(to.nodes());
         if (body_force_)
             cell_force_.assign(to.cells(), {0, 0});
         if (nonlocal_)
@@ -249,8 +270,8 @@ private:
         gradients_over_ = 0;
         std::vector<std::pair<std::uint32_t, Vec2>> reached;
         for (const auto n : nodes_.active())
-            if (nodes_.mass[n] > 0 && !was_active_[n])
-                reached.emplace_back(n, started_ && options_.frontier == "extrapolate" ? mean_of_neighbours(n) : Vec2{0, 0});
+            if (nodes_.mass[n] > 0 && !mass_before_[n])
+                reached.emplace_back(n, started_ && options_.frontier != "literal" ? mean_of_neighbours(n) : Vec2{0, 0});
         for (const auto& [n, v] : reached)
             if (started_)
             {
@@ -261,9 +282,8 @@ private:
             nodes_.mass[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
         const auto update = [&](std::uint32_t n)
         {
-            was_active_[n] = nodes_.mass[n] > 0;
-            if (!was_active_[n])
-                nodes_.vx[n] = nodes_.vy[n] = 0;
+            if (!(nodes_.mass[n] > 0))
+                mass_before_[n] = nodes_.vx[n] = nodes_.vy[n] = 0;
         };
         std::for_each(nodes_.active().begin(), nodes_.active().end(), update);
         std::for_each(left_.begin(), left_.end(), update);
@@ -277,7 +297,7 @@ private:
         nodes_.for_each(
             [&](std::size_t n, const auto& lanes)
             {
-                const Pack mass = lanes.load(&nodes_.mass[n]), was = lanes.load(&was_active_[n]);
+                const Pack mass = lanes.load(&nodes_.mass[n]), was = lanes.load(&mass_before_[n]);
                 const auto has = mass > Pack(0.0);
                 if (lanes.any(has != (was > Pack(0.0))))
                     moved.store(true, std::memory_order_relaxed);
@@ -292,6 +312,11 @@ private:
         return moved;
     }
 
+    void keep_mass()
+    {
+        nodes_.for_each([&](std::size_t n, const auto& lanes) { lanes.store(&mass_before_[n], lanes.load(&nodes_.mass[n])); });
+    }
+
     Vec2 mean_of_neighbours(std::uint32_t node) const
     {
         double mass = 0;
@@ -303,7 +328,7 @@ private:
                 if (!grid_.lattice.has_node(i + di, j + dj))
                     continue;
                 const std::size_t n = grid_.lattice.node(i + di, j + dj);
-                if (!was_active_[n])
+                if (!mass_before_[n])
                     continue;
                 mass += nodes_.mass[n];
                 momentum[0] += nodes_.mass[n] * nodes_.vx[n];
@@ -319,7 +344,12 @@ private:
             return;
         if (gradients_over_ != dt)
             cell_gradients(grid_, dt);
-        if (options_.convection == "upwind")
+        if (faces_)
+        {
+            faces_->find(grid_);
+            convect(grid_, *faces_, dt, 0.5, options_.frontier == "arrival" ? &mass_before_ : nullptr);
+        }
+        else if (options_.convection == "upwind")
             convect<UpwindConvection>(grid_, dt);
         else
             convect<CentralConvection>(grid_, dt);
@@ -375,13 +405,15 @@ private:
     Nodes& nodes_ = grid_.nodes;
     std::vector<Body> bodies_;
     NodeOps node_ops_;
-    std::vector<double> was_active_;   ///< 1 for nodes that had mass in the step before
+    std::vector<double> mass_before_;  ///< of nodes, in the step before [kg/m]
     std::vector<std::uint32_t> left_;  ///< nodes that went out of use
     LpfdmSpec options_;
+    StrainIncrement increment_;
     LpfdmSums<Support> sums_;                        ///< up to date from the end of a step on, but for bins that points left
     std::vector<double> workspace_;                  ///< the way of a field to its new order
     std::vector<double> hourglass_x_, hourglass_y_;  ///< empty unless the scene has them
     std::vector<Vec2> cell_force_;                   ///< so, too
+    std::optional<FreeFaces> faces_;                 ///< so, too
     std::optional<BodyForce> body_force_;
     std::optional<Tractions> tractions_;
     std::optional<NonlocalStrain> nonlocal_;

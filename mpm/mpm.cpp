@@ -25,7 +25,8 @@ public:
           node_ops_(scene, make_lattice(scene.grid)),
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
-          options_(scene.mpm)
+          options_(scene.mpm),
+          increment_(strain_increment(scene.mpm.increment))
     {
         if (scene.body_force)
             body_force_.emplace(*scene.body_force, scene.expression_constants());
@@ -396,7 +397,7 @@ private:
                               [&](std::size_t p, const auto& lanes)
                               {
                                   const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                                  law.update(q, p, lanes, v.template gradient<Strain>(at, strain, dt));
+                                  law.update(q, p, lanes, increment_.of(v.template gradient<Strain>(at, strain, dt)));
                               });
             });
     }
@@ -418,10 +419,10 @@ private:
                               [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                               {
                                   const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                                  const Gradient<Pack> d = v.template gradient<Strain>(at, strain, dt);
+                                  const Gradient<Pack> d = increment_.of(v.template gradient<Strain>(at, strain, dt));
                                   if constexpr (with_stress)
                                       law.update(q, p, lanes, d);
-                                  stretch<Shape>(q, p, lanes, d);
+                                  stretch<Shape>(q, p, lanes, increment_, d);
                                   const auto step = carrier.at(at);
                                   const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
                                   lanes.store(&q.x[p], x);
@@ -450,6 +451,7 @@ private:
     using Sums = NodeSums<Shape, Strain, Scatter::momentum_and_force>;
     BinSums<Shape, Sums> sums_;  ///< up to date from the end of a step on, but for bins that points left; empty if stress comes first
     MpmSpec options_;
+    StrainIncrement increment_;
     std::vector<double> workspace_;  ///< sums of the remapped momentum, and the way of a field to its new order
     std::vector<double> carrier_x_, carrier_y_;
     std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls

@@ -79,7 +79,7 @@ void check_virtual_work()
             for (const Bin& bin : body.bins.list())
             {
                 const BinFrame frame(grid.lattice, bin);
-                const BinMotion<Support> motion(grid, bin);
+                const BinMotion<Support> motion(grid, bin, 0, 0);
                 for (std::size_t p = bin.begin; p < bin.end; ++p)
                 {
                     const Corner c = frame.corner<Support>(q, p, AllLanes{});
