@@ -1,4 +1,5 @@
 #include "benchmarks/bench.hpp"
+#include "benchmarks/modes.hpp"
 #include "core/geometry.hpp"
 #include "core/method_limits.hpp"
 #include "core/point_driver.hpp"
@@ -167,6 +168,20 @@ int run(int argc, char** argv)
     bench_command->add_option("--seconds", bench_options.seconds, "of each measurement, at most 3600");
     bench_command->add_option("-o,--output", bench_options.output,
                               "write a CSV file, too; named bench.csv in a folder given to `testbed report` it goes into the report");
+    ModesOptions modes_options;
+    CLI::App* modes_command = app.add_subcommand("modes", "what small disturbances of a state grow to: modes, null modes, critical step");
+    add_scene_options(*modes_command, modes_options.scene);
+    modes_command->add_option("--at", modes_options.at, "time of the state [s]; at least one step is made")->check(CLI::NonNegativeNumber);
+    modes_command->add_option("--steps", modes_options.steps, "steps of the map, such as those in which a body moves by a cell")
+        ->check(CLI::Range(1, 100000));
+    modes_command->add_option("--top", modes_options.top, "modes of each sort that are shown")->check(CLI::Range(1, 1000));
+    modes_command->add_option("--frequency", modes_options.frequency, "exact frequency of the mode that is shown first [Hz]")
+        ->check(CLI::PositiveNumber);
+    modes_command->add_option("--tolerance", modes_options.tolerance, "growth in the map that is not yet called unstable")
+        ->check(CLI::PositiveNumber);
+    modes_command->add_flag("--no-critical-step", modes_options.leave_out_critical, "leave out the bisection for the critical step");
+    modes_command->add_flag("--json", modes_options.json, "print JSON");
+    modes_command->add_option("-o,--output", modes_options.scene.output, "write shapes (.h5), a picture of them (.png) or a table (.csv)");
     app.add_subcommand("list", "methods and material laws");
     app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
     app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
@@ -204,6 +219,11 @@ int run(int argc, char** argv)
     }
     else if (bench_command->parsed())
         bench(bench_options, make_particle_solver);
+    else if (modes_command->parsed())
+    {
+        if (const auto picture = modes(modes_options, make_particle_solver))
+            become("testbed-modes-plot", {picture->first, picture->second});
+    }
     else if (doc_command->parsed())
         fmt::print("{}", scene_documentation(table));
     else

@@ -54,6 +54,19 @@ struct Lattice
           numbered{0, 0, columns, rows}
     {
     }
+    /// Which part is numbered.
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.group("numbered",
+                [&]
+                {
+                    a.value("i0", "-", numbered.i0);
+                    a.value("j0", "-", numbered.j0);
+                    a.value("i1", "-", numbered.i1);
+                    a.value("j1", "-", numbered.j1);
+                });
+    }
     std::size_t cell_stride() const { return static_cast<std::size_t>(numbered.i1 - numbered.i0) + 4; }
     std::size_t node_stride() const { return static_cast<std::size_t>(numbered.i1 - numbered.i0) + 3; }
     std::size_t cell(int i, int j) const
@@ -176,6 +189,12 @@ public:
     void for_each(Kernel&& kernel) const
     {
         for_each_run(runs_, [&](const Run& run) TESTBED_FLATTEN { for_each_pack(run.begin, run.begin + run.count, kernel); });
+    }
+    /// Zero everywhere: for other values to be read.
+    void clear()
+    {
+        for (auto* values : {&mass, &vx, &vy, &fx, &fy})
+            std::fill(values->begin(), values->end(), 0.0);
     }
     std::size_t bytes() const
     {

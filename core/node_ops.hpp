@@ -96,6 +96,15 @@ public:
         find_driven(lattice, nodes);
         driven_.drive(restraints_, nodes, vx, vy);
     }
+    /// Of the walls: all else is as the scene says.
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for (std::size_t k = 0; k < walls_.size(); ++k)
+            a.group("wall/" + restraints_[first_wall_ + k].name, [&] { walls_[k].state(a, restraints_[first_wall_ + k]); });
+        if constexpr (Archive::reads)
+            seen_ = 0;
+    }
     bool restrains() const { return !restraints_.empty(); }
     std::vector<RestraintRecord> records() const;
     const std::vector<Restraint>& restraints() const { return restraints_; }

@@ -1,6 +1,7 @@
 #pragma once
 /// What the run loop knows of a method: the one boundary of type erasure, crossed a few times per step.
 
+#include "core/archive.hpp"
 #include "core/body.hpp"
 #include "core/method_limits.hpp"
 #include "core/node_ops.hpp"
@@ -71,7 +72,24 @@ public:
     virtual const char* kinematics() const = 0;  ///< which [exact.*] applies
     /// What time.cfl is a share of: the stability limit, or for an implicit method what it would be about [s].
     virtual double critical_time_step(const Scene& scene) { return testbed::critical_time_step(scene); }
+    /// What the next prepare() and advance() depend on, beside their arguments; between two steps, so after advance().
+    virtual void write_state(StateWriter&) { throw std::logic_error("this method cannot write its state"); }
+    /// The steps that follow have the same bits as if nothing had been between.
+    virtual void read_state(StateReader&) { throw std::logic_error("this method cannot read its state"); }
     /// One implicit step to the end instead of many explicit ones.
     virtual bool is_static() const { return false; }
 };
+
+inline State state_of(Solver& solver)
+{
+    State state;
+    StateWriter writer(state);
+    solver.write_state(writer);
+    return state;
+}
+inline void restore(Solver& solver, const State& state)
+{
+    StateReader reader(state);
+    solver.read_state(reader);
+}
 }  // namespace testbed

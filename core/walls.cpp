@@ -26,10 +26,7 @@ bool Wall::begin_step(double t, double dt, Restraint& restraint)
     if (others)
     {
         check_on_lattice(now, t);
-        take_nodes(now, restraint);
-        if (spec_.motion == "smooth")
-            take_faces(now, restraint);
-        taken_ = now;
+        take(now, restraint);
     }
     if (!velocity_)
         return others;
@@ -68,6 +65,14 @@ bool Wall::is_open_at(const Region& region, const Vec2& place) const
     const std::size_t along = door_direction(spec_);
     const double at = place[along] - (region.min[along] - spec_.min[along]), reach = slack * lattice_.cell_size;
     return at > (*spec_.door)[0] + reach && at < (*spec_.door)[1] - reach;
+}
+
+void Wall::take(const Region& region, Restraint& restraint)
+{
+    take_nodes(region, restraint);
+    if (spec_.motion == "smooth")
+        take_faces(region, restraint);
+    taken_ = region;
 }
 
 /// The nodes on and in the wall.

@@ -162,6 +162,8 @@ public:
                (workspace_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity()) * sizeof(double) +
                cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
     }
+    void write_state(StateWriter& writer) override { state(writer); }
+    void read_state(StateReader& reader) override { state(reader); }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
@@ -176,6 +178,54 @@ private:
         for (const Body& body : bodies_)
             density = std::min(density, body.points.mass / body.points.initial_volume);
         return density * grid_.lattice.cell_size * grid_.lattice.cell_size;
+    }
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for (Body& body : bodies_)
+            body.state(a);
+        node_ops_.state(a);
+        a.value("started", "-", started_);
+        Lattice lattice = grid_.lattice;
+        lattice.state(a);
+        if constexpr (Archive::reads)
+            rebuild_as_read(lattice);
+        std::vector<NodeIndex> at;
+        for (const auto n : nodes_.active())
+            at.push_back({lattice.node_i(n), lattice.node_j(n)});
+        a.group("node",
+                [&]
+                {
+                    a.column("i", "-", at, &NodeIndex::i);
+                    a.column("j", "-", at, &NodeIndex::j);
+                    a.nodal("velocity_x", "m/s", lattice, at, nodes_.vx);
+                    a.nodal("velocity_y", "m/s", lattice, at, nodes_.vy);
+                    a.nodal("mass_before", "kg/m", lattice, at, mass_before_);
+                });
+    }
+
+    /// After bodies were read: cells and nodes in use, and the sums, as they were; all nodal values are zero.
+    void rebuild_as_read(const Lattice& lattice)
+    {
+        if (lattice.numbered != grid_.lattice.numbered)
+            renumber(lattice);
+        nodes_.clear();
+        std::fill(mass_before_.begin(), mass_before_.end(), 0.0);
+        std::fill(hourglass_x_.begin(), hourglass_x_.end(), 0.0);
+        std::fill(hourglass_y_.begin(), hourglass_y_.end(), 0.0);
+        std::vector<const Bins*> bins;
+        moved_ = false;
+        for (const Body& body : bodies_)
+        {
+            bins.push_back(&body.bins);
+            moved_ |= body.bins.has_marks();
+        }
+        grid_.rebuild<S>(bins);
+        left_.clear();
+        was_rebuilt_ = true;
+        gradients_over_ = 0;
+        sums_.update(grid_.lattice, bodies_);
     }
 
     /// Points changed their cells: sorts them and finds the cells and nodes in use.

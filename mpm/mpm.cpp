@@ -132,6 +132,8 @@ public:
                    sizeof(double) +
                (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
     }
+    void write_state(StateWriter& writer) override { state(writer); }
+    void read_state(StateReader& reader) override { state(reader); }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
@@ -139,6 +141,36 @@ public:
 private:
     static constexpr int S = Shape::S;
     static constexpr bool reaches_beyond = std::is_same_v<Shape, BSplineShape>;  ///< the lattice's edge
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for (Body& body : bodies_)
+            body.state(a);
+        node_ops_.state(a);
+        a.value("started", "-", started_);
+        Lattice lattice = lattice_;
+        lattice.state(a);
+        if constexpr (Archive::reads)
+            rebuild_as_read(lattice);
+    }
+
+    /// After bodies were read: nodes in use and the sums, as they were.
+    void rebuild_as_read(const Lattice& lattice)
+    {
+        if (lattice.numbered != lattice_.numbered)
+            renumber(lattice);
+        std::vector<const Bins*> bins;
+        moved_ = false;
+        for (const Body& body : bodies_)
+        {
+            bins.push_back(&body.bins);
+            moved_ |= body.bins.has_marks();
+        }
+        find_nodes(bins);
+        if (options_.scheme != "usf")
+            sums_.update(lattice_, bodies_);
+    }
 
     void rebuild()
     {
@@ -153,16 +185,22 @@ private:
         {
             if (const Lattice lattice = with_numbers_for<S>(lattice_, bins); lattice.numbered != lattice_.numbered)
                 renumber(lattice);
-            gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
-            for (const auto n : nodes_.active())  // what is left must not be taken for soil
-                nodes_.mass[n] = nodes_.vx[n] = nodes_.vy[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
-            nodes_.set_active(gather_.active());
-            if constexpr (reaches_beyond)
-                edges_.rebuild(lattice_, nodes_.active());
+            find_nodes(bins);
         }
         if (options_.scheme != "usf")
             other_bins ? sums_.update(lattice_, bodies_) : sums_.update_changed(lattice_, bodies_);
         moved_ = false;
+    }
+
+    /// The nodes that bins touch.
+    void find_nodes(const std::vector<const Bins*>& bins)
+    {
+        gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
+        for (const auto n : nodes_.active())  // what is left must not be taken for soil
+            nodes_.mass[n] = nodes_.vx[n] = nodes_.vy[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
+        nodes_.set_active(gather_.active());
+        if constexpr (reaches_beyond)
+            edges_.rebuild(lattice_, nodes_.active());
     }
 
     void renumber(const Lattice& to)
