@@ -268,6 +268,10 @@ struct MpmSpec
 {
     std::string shape = "linear", scheme = "musl", strain = "four_point";
     double flip = 1;
+    std::string transfer = "flip";
+    int xpic_order = 2;
+    std::string null_space_filter = "none";
+    double mass_cutoff = 1e-7;
 
     template <class V>
     void describe(V& v)
@@ -275,7 +279,14 @@ struct MpmSpec
         v.choice("shape", shape, {"linear", "bspline", "cpgimp"}, "nodal shape functions as seen by the points");
         v.choice("scheme", scheme, {"usl", "usf", "musl"}, "stress update last, first, or last with remapped velocity");
         v.choice("strain", strain, {"four_point", "b_bar"}, "strain at each point, or with the cell's mean volumetric strain");
-        v.optional("flip", flip, "-", "share of FLIP in the velocity update, the rest is PIC; in [0, 1]");
+        v.choice("transfer", transfer, {"flip", "xpic"}, "velocity update of the points: FLIP blended with PIC, or XPIC(m)");
+        v.optional("flip", flip, "-", "share of FLIP in transfer = \"flip\", the rest is PIC; in [0, 1]");
+        v.optional("xpic_order", xpic_order, "-", "m of transfer = \"xpic\": 1 is PIC; a larger one keeps more of what the nodes see");
+        v.choice("null_space_filter", null_space_filter, {"none", "cell"},
+                 "cell: takes from the velocity of a cell's points what its nodes do not see; needs shape = \"linear\"");
+        v.optional("mass_cutoff", mass_cutoff, "-",
+                   "a node with less than this share of a full node's mass hands mass, momentum and force to its neighbours and takes their "
+                   "mean velocity; the default is what rounding asks for, 0 is off");
     }
 };
 
