@@ -284,9 +284,10 @@ struct MpmSpec
         v.optional("xpic_order", xpic_order, "-", "m of transfer = \"xpic\": 1 is PIC; a larger one keeps more of what the nodes see");
         v.choice("null_space_filter", null_space_filter, {"none", "cell"},
                  "cell: takes from the velocity of a cell's points what its nodes do not see; needs shape = \"linear\"");
-        v.optional("mass_cutoff", mass_cutoff, "-",
-                   "a node with less than this share of a full node's mass hands mass, momentum and force to its neighbours and takes their "
-                   "mean velocity; the default is what rounding asks for, 0 is off");
+        v.optional(
+            "mass_cutoff", mass_cutoff, "-",
+            "a node with less than this share of a full node's mass hands mass, momentum and force to its neighbours and takes their "
+            "mean velocity; the default is what rounding asks for, 0 is off");
     }
 };
 

@@ -1,8 +1,8 @@
 #pragma once
-/// Null-space filter of the velocity of the points (Gritton & Berzins 2017, in its local form): of the velocities of the points of a cell that
-/// part goes to which every node is blind, sum_p N_i(x_p) v_p = 0. What stays is their projection on the span of the shape functions at these
-/// points, the bilinear field nearest to them. Mass and momentum of the nodes do not change, so that linear and angular momentum are kept
-/// exactly. Cell by cell this is the null space of bilinear shapes: one cell's points see the same four nodes.
+/// Null-space filter of the velocity of the points (Gritton & Berzins 2017, in its local form): of the velocities of the points of a cell
+/// that part goes to which every node is blind, sum_p N_i(x_p) v_p = 0. What stays is their projection on the span of the shape functions
+/// at these points, the bilinear field nearest to them. Mass and momentum of the nodes do not change, so that linear and angular momentum
+/// are kept exactly. Cell by cell this is the null space of bilinear shapes: one cell's points see the same four nodes.
 
 #include "mpm/transfer.hpp"
 

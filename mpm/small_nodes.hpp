@@ -1,7 +1,7 @@
 #pragma once
-/// Nodes with little mass. The shape function of such a node is given to its neighbours that have more, in proportion to their mass: they get
-/// its mass, momentum and force, and it takes the mean of their velocities. Linear momentum is kept and forces stay dual to strains,
-/// as with extended B-splines (Hoellig, Reif & Wipper 2001); a mean does not reproduce a rotation, so that angular momentum is kept but for
+/// Nodes with little mass. The shape function of such a node is given to its neighbours that have more, in proportion to their mass: they
+/// get its mass, momentum and force, and it takes the mean of their velocities. Linear momentum is kept and forces stay dual to strains, as
+/// with extended B-splines (Hoellig, Reif & Wipper 2001); a mean does not reproduce a rotation, so that angular momentum is kept but for
 /// the share of mass that is handed over. The classical cut-off (Sulsky, Zhou & Schreyer 1995) leaves the force of the node out instead,
 /// and with it momentum.
 
@@ -34,7 +34,8 @@ public:
     void clear() { list_.clear(); }
     bool has(std::uint32_t node) const
     {
-        return std::binary_search(list_.begin(), list_.end(), Small{node, 0, 0}, [](const Small& a, const Small& b) { return a.node < b.node; });
+        return std::binary_search(list_.begin(), list_.end(), Small{node, 0, 0},
+                                  [](const Small& a, const Small& b) { return a.node < b.node; });
     }
 
     /// Mass and momentum, where nodes above `least` hold a velocity and the others a momentum; then all hold a velocity.

@@ -3,9 +3,9 @@
 ///     v_p <- S w + S dv,   S w = (1 - (1 - S S+)^m) v_p,   w = m v - m v*,   v* = sum_{r=2..m} (-1)^r v_r,
 ///     v_r = (m - r + 1)/r S+ S v_{r-1},   v_1 = v = S+ v_p,
 /// and with what the filter takes away, A* dt = v_p - S w, their position x_p += dt S v - dt/2 A* dt, where the paper's mean of the nodal
-/// velocities before and after the step is here that of the half step between. m = 1 is PIC; what no node sees, S+ v_p = 0, goes at once for
-/// every m; of what S S+ returns by the share a there stays 1 - (1 - a)^m. Linear momentum is kept exactly; angular momentum but for what the filter
-/// takes from rotation, less and less as m grows.
+/// velocities before and after the step is here that of the half step between. m = 1 is PIC; what no node sees, S+ v_p = 0, goes at once
+/// for every m; of what S S+ returns by the share a there stays 1 - (1 - a)^m. Linear momentum is kept exactly; angular momentum but for
+/// what the filter takes from rotation, less and less as m grows.
 
 #include "mpm/transfer.hpp"
 
