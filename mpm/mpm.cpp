@@ -483,7 +483,8 @@ private:
     void filter_points()
     {
         if constexpr (std::is_same_v<Shape, LinearShape>)
-            filter_null_space<Shape>(lattice_, bodies_);
+            for_each_bin([](Body& body, const Bin& bin, std::size_t, const BinFrame& frame)
+                         { filter_null_space<Shape>(frame, body.points, bin); });
     }
 
     /// Stress alone, with the nodal velocity (USF).
