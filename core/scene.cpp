@@ -182,21 +182,13 @@ const std::vector<Variant>& variants()
          }},
         {"lpfdm", "lpfdm", "each point has a domain, central convection, hourglass control", [](Scene& s) { s.lpfdm = LpfdmSpec{}; }},
         {"mpm-linear", "mpm", "linear shape functions, strain at each point, FLIP, MUSL",
-         [](Scene& s) {
-             s.mpm = {"linear", "musl", "four_point", "midpoint", 1.0};
-         }},
+         [](Scene& s) { s.mpm = {.shape = "linear", .scheme = "musl", .strain = "four_point"}; }},
         {"mpm-linear-bbar", "mpm", "linear shape functions, volumetric strain averaged over each cell, FLIP, MUSL",
-         [](Scene& s) {
-             s.mpm = {"linear", "musl", "b_bar", "midpoint", 1.0};
-         }},
+         [](Scene& s) { s.mpm = {.shape = "linear", .scheme = "musl", .strain = "b_bar"}; }},
         {"mpm-bspline", "mpm", "quadratic B-splines, linear at the edges of the lattice; FLIP, MUSL",
-         [](Scene& s) {
-             s.mpm = {"bspline", "musl", "four_point", "midpoint", 1.0};
-         }},
+         [](Scene& s) { s.mpm = {.shape = "bspline", .scheme = "musl", .strain = "four_point"}; }},
         {"mpm-cpgimp", "mpm", "contiguous-particle GIMP: each point's box stretches with it; FLIP, MUSL",
-         [](Scene& s) {
-             s.mpm = {"cpgimp", "musl", "four_point", "midpoint", 1.0};
-         }},
+         [](Scene& s) { s.mpm = {.shape = "cpgimp", .scheme = "musl", .strain = "four_point"}; }},
         {"fem-q1", "fem", "small-strain reference, bilinear elements", [](Scene& s) { s.fem.degree = 1; }},
         {"fem-q2", "fem", "small-strain reference, biquadratic elements", [](Scene& s) { s.fem.degree = 2; }},
     };

@@ -277,6 +277,10 @@ struct MpmSpec
 {
     std::string shape = "linear", scheme = "musl", strain = "four_point", increment = "midpoint";
     double flip = 1;
+    std::string transfer = "flip";
+    int xpic_order = 2;
+    std::string null_space_filter = "none";
+    double mass_cutoff = 1e-7;
 
     template <class V>
     void describe(V& v)
@@ -286,7 +290,15 @@ struct MpmSpec
         v.choice("strain", strain, {"four_point", "b_bar"}, "strain at each point, or with the cell's mean volumetric strain");
         v.choice("increment", increment, {"midpoint", "forward"},
                  "strain over the configuration at the middle of the step, second order, or at its start, first order");
-        v.optional("flip", flip, "-", "share of FLIP in the velocity update, the rest is PIC; in [0, 1]");
+        v.choice("transfer", transfer, {"flip", "xpic"}, "velocity update of the points: FLIP blended with PIC, or XPIC(m)");
+        v.optional("flip", flip, "-", "share of FLIP in transfer = \"flip\", the rest is PIC; in [0, 1]");
+        v.optional("xpic_order", xpic_order, "-", "m of transfer = \"xpic\": 1 is PIC; a larger one keeps more of what the nodes see");
+        v.choice("null_space_filter", null_space_filter, {"none", "cell"},
+                 "cell: takes from the velocity of a cell's points what its nodes do not see; needs shape = \"linear\"");
+        v.optional(
+            "mass_cutoff", mass_cutoff, "-",
+            "a node with less than this share of a full node's mass hands mass, momentum and force to its neighbours and takes their "
+            "mean velocity; the default is what rounding asks for, 0 is off");
     }
 };
 

@@ -464,6 +464,14 @@ void check_scene(const Scene& scene, Problems& problems)
         problems.add("mpm.flip", fmt::format("must lie in [0, 1], not {}", scene.mpm.flip));
     if (scene.mpm.strain == "b_bar" && scene.mpm.shape != "linear")
         problems.add("mpm.strain", "b_bar averages over a cell and needs shape = \"linear\"");
+    if (scene.mpm.xpic_order < 1 || scene.mpm.xpic_order > 20)
+        problems.add("mpm.xpic_order", fmt::format("must lie in [1, 20], not {}", scene.mpm.xpic_order));
+    if (scene.mpm.transfer == "xpic" && scene.mpm.flip != 1)
+        problems.add("mpm.flip", "blends FLIP with PIC; transfer = \"xpic\" has no use for it");
+    if (scene.mpm.null_space_filter != "none" && scene.mpm.shape != "linear")
+        problems.add("mpm.null_space_filter", "works cell by cell and needs shape = \"linear\"; for wider shapes take transfer = \"xpic\"");
+    if (!(scene.mpm.mass_cutoff >= 0 && scene.mpm.mass_cutoff <= 0.25))
+        problems.add("mpm.mass_cutoff", fmt::format("must lie in [0, 0.25], not {}", scene.mpm.mass_cutoff));
     if (scene.fem.degree != 1 && scene.fem.degree != 2)
         problems.add("fem.degree", fmt::format("1 or 2 is asked, not {}", scene.fem.degree));
     if (scene.fem.refinements < 0 || scene.fem.refinements > 10)

@@ -5,10 +5,14 @@
 #include "core/nonlocal.hpp"
 #include "core/tractions.hpp"
 #include "mpm/edges.hpp"
-#include "mpm/transfer.hpp"
+#include "mpm/null_space.hpp"
+#include "mpm/small_nodes.hpp"
+#include "mpm/velocity_update.hpp"
+#include "mpm/xpic.hpp"
 
 #include <atomic>
 #include <cmath>
+#include <limits>
 
 namespace testbed
 {
@@ -26,8 +30,11 @@ public:
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
           options_(scene.mpm),
-          increment_(strain_increment(scene.mpm.increment))
+          increment_(strain_increment(scene.mpm.increment)),
+          least_mass_(options_.mass_cutoff * mass_of_a_full_node())
     {
+        if (options_.transfer == "xpic")
+            xpic_.emplace(options_.xpic_order);
         if (scene.body_force)
             body_force_.emplace(*scene.body_force, scene.expression_constants());
         if (!scene.tractions.empty())
@@ -82,7 +89,10 @@ public:
                                                           });
                    fold_forces();
                    if (tractions_)
+                   {
                        tractions_->apply(lattice_, bodies_, nodes_, t);
+                       fold_forces();
+                   }
                    node_ops_.apply_forces(lattice_, nodes_, t);
                });
         lag_ = started_ ? 0.5 * dt : 0;
@@ -90,6 +100,10 @@ public:
 
     void advance(double dt) override
     {
+        if (xpic_)
+            timer_("xpic", [&] { filter_velocity(); });
+        if (options_.null_space_filter == "cell")
+            timer_("null-space filter", [&] { filter_points(); });
         // the given initial velocity is that of t = 0: the first kick is half a step
         timer_("acceleration", [&] { accelerate_and_keep_increment(started_ ? dt : 0.5 * dt); });
         started_ = true;
@@ -111,6 +125,8 @@ public:
             timer_("points, material", [&] { move_points<true>(nodes_.vx, nodes_.vy, dt); });
         else
             timer_("points", [&] { move_points<false>(nodes_.vx, nodes_.vy, dt); });
+        if (xpic_)
+            timer_("xpic", [&] { move_by_filter(dt); });
         node_ops_.end_step(dt);
     }
 
@@ -127,7 +143,8 @@ public:
     }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() + sums_.bytes() +
+        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() + small_.bytes() + sums_.bytes() +
+               (xpic_ ? xpic_->bytes() : 0) +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
                    sizeof(double) +
                (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
@@ -230,6 +247,7 @@ private:
     void to_nodes(const std::vector<double>& sums)
     {
         constexpr std::size_t Q = sums_of<what>;
+        std::atomic<bool> has_small{false};
         gather_.sum<Q>(sums,
                        [&](std::size_t i, const std::array<double, Q>& s)
                        {
@@ -239,7 +257,7 @@ private:
                                nodes_.vx[i] = s[1];
                                nodes_.vy[i] = s[2];
                                if constexpr (!reaches_beyond)
-                                   to_velocity(i);
+                                   to_velocity(i, has_small);
                            }
                            if constexpr (what != Scatter::momentum)
                            {
@@ -252,14 +270,43 @@ private:
             edges_.fold_mass(nodes_.mass);
             edges_.fold(nodes_.vx);
             edges_.fold(nodes_.vy);
-            parallel_for(nodes_.active().size(), [&](std::size_t a) { to_velocity(nodes_.active()[a]); });
+            parallel_for(nodes_.active().size(), [&](std::size_t a) { to_velocity(nodes_.active()[a], has_small); });
         }
+        if constexpr (what != Scatter::force)
+            take_small_nodes(has_small);
     }
-    void to_velocity(std::size_t i)
+    /// Divides the momentum by the mass, if it is more than a node needs to count.
+    void to_velocity(std::size_t i, std::atomic<bool>& has_small)
     {
-        const double inverse = inverse_mass(nodes_, i);
+        if (!(nodes_.mass[i] > least_mass_))
+            return has_small.store(true, std::memory_order_relaxed);
+        const double inverse = 1 / nodes_.mass[i];
         nodes_.vx[i] *= inverse;
         nodes_.vy[i] *= inverse;
+    }
+    /// The nodes that do not count go to their neighbours; those that have none count all the same.
+    void take_small_nodes(bool has_small)
+    {
+        small_.clear();
+        if (!has_small)
+            return;
+        if (least_mass_ > 0)
+            small_.find(lattice_, nodes_, least_mass_);
+        for (const auto n : nodes_.active())
+            if (!(nodes_.mass[n] > least_mass_) && !small_.has(n))
+            {
+                const double inverse = inverse_mass(nodes_, n);
+                nodes_.vx[n] *= inverse;
+                nodes_.vy[n] *= inverse;
+            }
+        small_.fold_momentum(nodes_);
+    }
+    double mass_of_a_full_node() const
+    {
+        double least = std::numeric_limits<double>::infinity();
+        for (const Body& body : bodies_)
+            least = std::min(least, body.points.mass / body.points.initial_volume);
+        return least * lattice_.cell_size * lattice_.cell_size;
     }
     void fold_forces()
     {
@@ -268,10 +315,14 @@ private:
             edges_.fold(nodes_.fx);
             edges_.fold(nodes_.fy);
         }
+        small_.fold(nodes_.fx);
+        small_.fold(nodes_.fy);
     }
-    /// Values beyond the edge of the lattice, where the shapes reach there.
+    /// Values of nodes that do not count, and beyond the edge of the lattice, where the shapes reach there.
     void extend(std::vector<double>& x, std::vector<double>& y)
     {
+        small_.extend(x);
+        small_.extend(y);
         if constexpr (reaches_beyond)
         {
             edges_.extend(x);
@@ -326,68 +377,159 @@ private:
         extend(nodes_.fx, nodes_.fy);
     }
 
-    /// kernel(body, law, bin, number of the bin among all, frame) for every bin of every body.
+    /// kernel(body, bin, number of the bin among all, frame) for every bin of every body.
     template <class Kernel>
     void for_each_bin(Kernel&& kernel)
     {
         std::size_t first_bin = 0;
         for (Body& body : bodies_)
         {
-            const auto& bins = body.bins.list();
+            for_each_bin_of(body, first_bin, kernel);
+            first_bin += body.bins.list().size();
+        }
+    }
+    /// The same with the law of the body: kernel(body, law, bin, number, frame).
+    template <class Kernel>
+    void for_each_bin_with_law(Kernel&& kernel)
+    {
+        std::size_t first_bin = 0;
+        for (Body& body : bodies_)
+        {
             std::visit(
-                [&](const auto& law) {
-                    parallel_for(bins.size(),
-                                 [&](std::size_t b) { kernel(body, law, bins[b], first_bin + b, BinFrame(lattice_, bins[b])); });
+                [&](const auto& law)
+                {
+                    for_each_bin_of(body, first_bin,
+                                    [&](Body& b, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_INLINE
+                                    { kernel(b, law, bin, number, frame); });
                 },
                 body.material);
-            first_bin += bins.size();
+            first_bin += body.bins.list().size();
         }
+    }
+    template <class Kernel>
+    void for_each_bin_of(Body& body, std::size_t first_bin, Kernel&& kernel)
+    {
+        const auto& bins = body.bins.list();
+        parallel_for(bins.size(), [&](std::size_t b) { kernel(body, bins[b], first_bin + b, BinFrame(lattice_, bins[b])); });
     }
 
     void update_velocity(bool remap)
     {
         if (remap)
             make_room(workspace_, gather_.blocks() * sums_of<Scatter::momentum>);
-        if (options_.flip < 1)
-            remap ? update_velocity<true, true>() : update_velocity<true, false>();
+        if (xpic_)
+            update_velocity(*xpic_, remap);
+        else if (options_.flip < 1)
+            update_velocity(BlendUpdate{options_.flip}, remap);
         else
-            remap ? update_velocity<false, true>() : update_velocity<false, false>();
+            update_velocity(FlipUpdate{}, remap);
     }
-    /// v_p = flip (v_p + sum N dv) + (1 - flip) sum N v; and the sums of the new momentum, if nodes ask for them.
-    template <bool with_pic, bool with_remap>
-    void update_velocity()
+    template <class Update>
+    void update_velocity(Update&& rule, bool remap)
+    {
+        remap ? update_velocity<true>(rule) : update_velocity<false>(rule);
+    }
+    /// The new velocity of the points; and the sums of their momentum, if nodes ask for them.
+    template <bool with_remap, class Update>
+    void update_velocity(Update& rule)
     {
         using Momentum = NodeSums<Shape, Strain, Scatter::momentum>;
-        const Pack flip(options_.flip), pic(1 - options_.flip);
         for_each_bin(
-            [&](Body& body, const auto&, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
             {
                 Points& q = body.points;
-                const NodalVelocity<S> increment(lattice_, bin, nodes_.fx, nodes_.fy), total(lattice_, bin, nodes_.vx, nodes_.vy);
+                const auto update = rule.template in_bin<S>(lattice_, nodes_, body, bin);
                 for_each_pack(bin.begin, bin.end,
                               [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                               {
                                   const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                                  const auto dv = increment.at(at);
-                                  Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
-                                  if constexpr (with_pic)
-                                  {
-                                      const auto v = total.at(at);
-                                      vx = flip * vx + pic * v[0];
-                                      vy = flip * vy + pic * v[1];
-                                  }
-                                  lanes.store(&q.vx[p], vx);
-                                  lanes.store(&q.vy[p], vy);
+                                  update.update(q, p, lanes, at);
                               });
                 if constexpr (with_remap)
                     sum_bin<Shape, Momentum>(lattice_, body, bin, &workspace_[number * Momentum::numbers]);
             });
     }
 
+    /// What XPIC keeps of the velocity of the points, on the nodes.
+    void filter_velocity()
+    {
+        const bool driven = node_ops_.restrains();
+        make_room(workspace_, gather_.blocks() * SmoothedSums<Shape>::Q);
+        xpic_->filter(nodes_, driven ? mapped_x_ : nodes_.vx, driven ? mapped_y_ : nodes_.vy,
+                      [&](std::vector<double>& x, std::vector<double>& y) { smooth(x, y); });
+        extend(xpic_->kept_x(), xpic_->kept_y());
+        xpic_->begin_update(bodies_);
+    }
+    /// A nodal field goes to the points and back.
+    void smooth(std::vector<double>& x, std::vector<double>& y)
+    {
+        using Smoothed = SmoothedSums<Shape>;
+        extend(x, y);
+        for_each_bin(
+            [&](const Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+            {
+                Smoothed sums(lattice_, bin, x, y);
+                for_each_pack(bin.begin, bin.end,
+                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                              { sums.add(body.points, lanes, frame.template corner<Shape>(body.points, p, lanes)); });
+                sums.write(&workspace_[number * Smoothed::numbers]);
+            });
+        gather_.template sum<2>(workspace_,
+                                [&](std::size_t i, const std::array<double, 2>& s)
+                                {
+                                    x[i] = s[0];
+                                    y[i] = s[1];
+                                });
+        for (auto* values : {&x, &y})
+        {
+            if constexpr (reaches_beyond)
+                edges_.fold(*values);
+            small_.fold(*values);
+        }
+        nodes_.for_each(
+            [&](std::size_t i, const auto& lanes)
+            {
+                const Pack inverse = inverse_mass(nodes_, i, lanes);
+                lanes.store(&x[i], lanes.load(&x[i]) * inverse);
+                lanes.store(&y[i], lanes.load(&y[i]) * inverse);
+            });
+    }
+    /// What XPIC took from the velocity of the points moves them, too.
+    void move_by_filter(double dt)
+    {
+        const bool sum = options_.scheme != "usf";
+        std::atomic<bool> moved{moved_};
+        for_each_bin(
+            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+            {
+                xpic_->move(body, bin, dt);
+                if (sum ? sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number)) : any_left(body.points, bin, frame))
+                {
+                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
+                    moved.store(true, std::memory_order_relaxed);
+                }
+            });
+        moved_ = moved;
+    }
+    static bool any_left(const Points& q, const Bin& bin, const BinFrame& frame)
+    {
+        bool left = false;
+        for_each_pack(bin.begin, bin.end,
+                      [&](std::size_t p, const auto& lanes)
+                      { left |= stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes))); });
+        return left;
+    }
+    void filter_points()
+    {
+        if constexpr (std::is_same_v<Shape, LinearShape>)
+            for_each_bin([](Body& body, const Bin& bin, std::size_t, const BinFrame& frame)
+                         { filter_null_space<Shape>(frame, body.points, bin); });
+    }
+
     /// Stress alone, with the nodal velocity (USF).
     void update_stress(double dt)
     {
-        for_each_bin(
+        for_each_bin_with_law(
             [&](Body& body, const auto& law, const Bin& bin, std::size_t, const BinFrame& frame)
             {
                 Points& q = body.points;
@@ -408,7 +550,7 @@ private:
     void move_points(const std::vector<double>& carrier_x, const std::vector<double>& carrier_y, double dt)
     {
         std::atomic<bool> moved{false};
-        for_each_bin(
+        for_each_bin_with_law(
             [&](Body& body, const auto& law, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
             {
                 Points& q = body.points;
@@ -448,10 +590,13 @@ private:
     Nodes nodes_;
     Gather gather_;
     LatticeEdges edges_;  ///< empty where shapes end at the edge
+    SmallNodes small_;    ///< empty unless a node has too little mass to count
     using Sums = NodeSums<Shape, Strain, Scatter::momentum_and_force>;
     BinSums<Shape, Sums> sums_;  ///< up to date from the end of a step on, but for bins that points left; empty if stress comes first
     MpmSpec options_;
     StrainIncrement increment_;
+    double least_mass_;  ///< of a node that counts [kg/m]
+    std::optional<Xpic> xpic_;
     std::vector<double> workspace_;  ///< sums of the remapped momentum, and the way of a field to its new order
     std::vector<double> carrier_x_, carrier_y_;
     std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls
