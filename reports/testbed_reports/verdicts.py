@@ -105,10 +105,11 @@ def nearest_sound(run, others, axes):
     """The setting of a sound run that differs from this one by one axis, the nearest value first, another method last; '' if none."""
     found = []
     for other in others:
-        differ = [k for k in axes if k in run.values and not same(run.values[k], other.values.get(k))]
+        keys = ["variant" if k == "method" else k for k in axes]  # a run's `method` is its family
+        differ = [k for k in keys if k in run.values and not same(run.values[k], other.values.get(k))]
         if other.verdict.level == "sound" and len(differ) == 1:
             key = differ[0]
-            found.append((key == "method", _distance(run.values[key], other.values[key]), f"{key} = {other.values[key]}"))
+            found.append((key == "variant", _distance(run.values[key], other.values[key]), f"{'method' if key == 'variant' else key} = {other.values[key]}"))
     return min(found)[2] if found else ""
 
 
