@@ -131,7 +131,7 @@ def volume_change(result):
     return np.array([s.time for s in result.snapshots]), np.array(change)
 
 
-# (quantity, norm) -> (function of a result, how its course is summed up, keys of report.reference that it needs)
+# (quantity, norm) -> (function of a result, how its course is summed up, keys of report.reference or of the grid that it needs)
 SERIES = {
     ("energy_gain", "scaled"): (energy_gain, "max", ("energy_scale",)),
     ("energy_growth", "max"): (energy_growth, "max", ("energy_seed",)),
@@ -146,14 +146,15 @@ SERIES = {
     ("stress_noise", "end"): (stress_noise, "end", ("stress_noise",)),
     ("rest_motion", "max"): (rest_motion, "max", ("rest_scale",)),
     ("flight_error", "max"): (flight_error, "max", ("flight",)),
-    ("points_outside", "share"): (points_outside, "max", ()),
+    ("points_outside", "share"): (points_outside, "max", ("grid.size",)),
     ("volume_change", "max"): (volume_change, "max", ()),
 }
 
 
 def asked(result):
     """The (quantity, norm) whose scales the scene gives."""
-    return [key for key, (_, _, needs) in SERIES.items() if all(n in result.reference for n in needs)]
+    known = set(result.reference) | {f"grid.{key}" for key in result.resolved.get("grid", {})}
+    return [key for key, (_, _, needs) in SERIES.items() if known.issuperset(needs)]
 
 
 def stability(result):
