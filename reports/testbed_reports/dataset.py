@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from . import metrics
+from .limits import find_limits
 from .results import Result, ResultError
 from .study_file import StudyError, matches, read_study
+from .verdicts import judge_study
 
 CSV_COLUMNS = ("run_id", "case", "method", "variant", "L", "ppc", "dt", "seed", "quantity", "norm", "value",
                "solve_s", "particle_steps", "status")
@@ -27,6 +29,9 @@ class Run:
     result: Result | None = None
     rows: dict = field(default_factory=dict)
     errors: list = field(default_factory=list)
+    command: str = ""  # that makes it again
+    search: str = ""  # what is common to the runs of one bisection
+    verdict: object = None  # of a study with cases
 
     @property
     def completed(self):
@@ -49,6 +54,11 @@ class Study:
     plan: dict
     runs: list
     left_out: list
+    limits: list = field(default_factory=list)  # found by searches
+
+    def case(self, name):
+        """The [[case]] of that name."""
+        return next(case for case in self.spec.cases if case.name == name)
 
     @property
     def name(self):
@@ -92,13 +102,14 @@ def read_run(folder, entry):
     for key in ("case", "method", "variant", "L", "ppc", "seed"):
         if entry.get(key) not in (None, ""):
             values[key] = entry[key]
-    run = Run(entry["id"], folder, values, "missing", entry.get("outcome", "") or "not run yet")
+    run = Run(entry["id"], folder, values, "missing", entry.get("outcome", "") or "not run yet", command=entry.get("command", ""),
+              search=entry.get("search", ""))
     path = folder / "result.h5"
     if not path.is_file():
         return run
     try:
         result = Result(path)
-        values.update(case=result.case, method=result.method, variant=result.variant, L=result.cell_size,
+        values.update(case=entry.get("case") or result.case, method=result.method, variant=result.variant, L=result.cell_size,
                       ppc=result.scene.get("points_per_cell", ""), dt=result.performance.get("dt", ""),
                       seed=result.seed)
     except ResultError as error:
@@ -127,7 +138,11 @@ def read_study_folder(folder):
     folder = Path(folder)
     spec, plan = read_study(folder / "study.toml", need_scene=False), read_plan(folder)
     runs = [read_run(folder / "runs" / entry["id"], entry) for entry in plan.get("runs", [])]
-    return Study(folder, spec, plan, runs, plan.get("left_out", []))
+    study = Study(folder, spec, plan, runs, plan.get("left_out", []))
+    if spec.cases:
+        judge_study(study)
+        study.limits = find_limits(study)
+    return study
 
 
 def _number(value):
@@ -148,7 +163,7 @@ def metrics_csv(runs):
             continue
         performance = run.result.performance
         for (quantity, norm), value in run.rows.items():
-            writer.writerow([run.id, run.result.case, run.result.method, run.result.variant,
+            writer.writerow([run.id, run.values["case"], run.result.method, run.result.variant,
                              _number(run.values["L"]), run.values["ppc"], _number(run.values["dt"]),
                              run.values["seed"], quantity, norm, repr(float(value)),
                              _number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")),

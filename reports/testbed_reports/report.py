@@ -14,6 +14,7 @@ from .figures import FigureError, draw, label_of
 from .page import inline_svg, render
 from .results import ResultError
 from .study_file import StudyError
+from .stability_page import stability_section
 from .style import RC, WIDTH, Style, plt
 from .tables import Table, as_csv, as_latex, study_tables, targets_table
 from .targets import judge_all
@@ -103,7 +104,7 @@ def _study_section(study, style, out, command, failures):
     figures, used = [], Counter()
     for entry in study.spec.figures:
         what = (entry.get("quantity") or entry.get("component") or " ".join(filter(None, (entry.get("y"), entry.get("x"))))
-                or "deformed_grid")
+                or ("deformed_grid" if entry.get("deformed_grid") else ""))
         name = slug(entry.get("name") or "_".join(filter(None, (entry["kind"], what, entry.get("norm", "")))))
         used[name] += 1
         name = f"{slug(study.name)}_{name}" + (f"_{used[name]}" if used[name] > 1 else "")
@@ -126,13 +127,26 @@ def _study_section(study, style, out, command, failures):
         finally:
             plt.close("all")
         figures.append(shown)
-    tables = study_tables(study)
+    stability, files = None, []
+    if study.spec.cases:
+        stability, tables, files = stability_section(study, style, out, slug(study.name))
+    else:
+        tables = study_tables(study)
+    for table in files:
+        _write_table(out, study, table)
     counts = Counter(run.status for run in study.runs)
     summary = f"{len(study.runs)} runs: " + ", ".join(f"{n} {status}" for status, n in counts.items()) + "."
     if study.left_out:
         summary += f" {len(study.left_out)} combinations left out."
     return {"anchor": f"study-{slug(study.name)}", "title": study.spec.title, "purpose": study.spec.purpose,
-            "summary": summary, "figures": figures, "tables": tables}
+            "summary": summary, "figures": figures, "tables": tables, "stability": stability}
+
+
+def _write_table(out, study, table):
+    """A table for print and for other programs."""
+    base = out / "tables" / f"{slug(study.name)}_{slug(table.name)}"
+    write_atomically(base.with_suffix(".csv"), as_csv(table))
+    write_atomically(base.with_suffix(".tex"), as_latex(table))
 
 
 def _bench_section(path, style, out, failures):
@@ -185,7 +199,7 @@ def build(folders, out, command):
         (out / name).mkdir(parents=True, exist_ok=True)
     for study in studies:
         for run in study.runs:
-            if not run.completed:
+            if not run.completed and not study.spec.cases:  # the matrix tells of these
                 failures.append([study.name, run.id, run.status, run.reason])
             failures += [[study.name, run.id, "number missing", error] for error in run.errors]
     benches = [path for path in (Path(folder) / bench.FILE for folder in folders) if path.is_file()]
@@ -194,9 +208,7 @@ def build(folders, out, command):
     sections = [_study_section(study, style, out, command, failures) for study in studies]
     for (study, judged), section in zip(verdicts, sections):
         for table in section["tables"] + ([targets_table(judged)] if judged else []):
-            base = out / "tables" / f"{slug(study.name)}_{slug(table.name)}"
-            write_atomically(base.with_suffix(".csv"), as_csv(table))
-            write_atomically(base.with_suffix(".tex"), as_latex(table))
+            _write_table(out, study, table)
     sections += [section for path in benches if (section := _bench_section(path, style, out, failures))]
     rows, warnings = provenance(studies, command)
     flat = [(study.name, v) for study, judged in verdicts for v in judged]
