@@ -150,11 +150,12 @@ struct MidStep
 
     MidStep() = default;
     /// @param g gradient of the step's displacement @param u displacement of the middle node [cells]
-    TESTBED_INLINE MidStep(double theta, const Gradient<>& g, const Vec2& u)
-        : stretch{1 + theta * g.xx, 1 + theta * g.yy},
-          slope{theta * g.xy / stretch[0], theta * g.yx / stretch[1]},
-          middle{1 + slope[0] - theta * u[0] / stretch[0], 1 + slope[1] - theta * u[1] / stretch[1]}
+    TESTBED_INLINE MidStep(double theta, const Gradient<>& g, const Vec2& u) : stretch{1 + theta * g.xx, 1 + theta * g.yy}
     {
+        const auto inverse = [](double e) { return 1 - e * (1 - e); };  // a division for each bin would cost a twentieth of a step
+        const double x = theta * inverse(theta * g.xx), y = theta * inverse(theta * g.yy);
+        slope = {x * g.xy, y * g.yx};
+        middle = {1 + slope[0] - x * u[0], 1 + slope[1] - y * u[1]};
     }
 };
 
