@@ -77,6 +77,12 @@ struct Weights
     }
 };
 
+/// The middles of a pack of boxes in their bin, and their half widths [cells]; points without a box have none.
+struct Box
+{
+    Pack x, y, hx, hy;
+};
+
 /// Maps points to the coordinates of their bin.
 struct BinFrame
 {
@@ -94,17 +100,22 @@ struct BinFrame
     }
 
     template <class Support, class Lanes>
-    TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    TESTBED_INLINE Box box(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
     {
         const Pack cx = x * Pack(scale) - Pack(x0), cy = y * Pack(scale) - Pack(y0);
         if constexpr (!Support::has_box)
-            return {cx - Pack(Support::half_width), cy - Pack(Support::half_width), Pack(0.0), Pack(0.0)};
+            return {cx, cy, Pack(0.0), Pack(0.0)};
         else
-        {
-            const Pack hx = min(lanes.load(&q.half_x[p]) * Pack(scale), Pack(0.5));
-            const Pack hy = min(lanes.load(&q.half_y[p]) * Pack(scale), Pack(0.5));
-            return {cx - hx, cy - hy, hx + hx, hy + hy};
-        }
+            return {cx, cy, min(lanes.load(&q.half_x[p]) * Pack(scale), Pack(0.5)), min(lanes.load(&q.half_y[p]) * Pack(scale), Pack(0.5))};
+    }
+    template <class Support, class Lanes>
+    TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    {
+        const Box b = box<Support>(q, p, lanes, x, y);
+        if constexpr (!Support::has_box)
+            return {b.x - Pack(Support::half_width), b.y - Pack(Support::half_width), Pack(0.0), Pack(0.0)};
+        else
+            return {b.x - b.hx, b.y - b.hy, b.hx + b.hx, b.hy + b.hy};
     }
     template <class Support, class Lanes>
     TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes) const

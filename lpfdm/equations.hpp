@@ -187,19 +187,18 @@ struct BinMotion
                           {scale * vx[stride + 1], scale * vy[stride + 1]});
         }
     }
-    /// Displacement gradient and displacement of the points at c over the step.
-    TESTBED_INLINE Gradient<Pack> operator()(const Corner& c, double dt, Pack& x, Pack& y) const
+    /// Displacement gradient and displacement of the points with these boxes over the step.
+    TESTBED_INLINE Gradient<Pack> operator()(const Box& box, double dt, Pack& x, Pack& y) const
     {
         Gradient<Pack> d = Pack(1.0) * coefficients[0];
         if constexpr (S == 1)
-            displace({Pack(1.0) - c.ax, c.ax}, {Pack(1.0) - c.ay, c.ay}, dt, x, y);
+            displace({Pack(1.0) - box.x, box.x}, {Pack(1.0) - box.y, box.y}, dt, x, y);
         else
         {
-            const Pack half(0.5), hx = half * c.wx, hy = half * c.wy, cx = c.ax + hx, cy = c.ay + hy;
-            const Pack beyond_x = cx + Pack(mid.slope[0]) * cy - Pack(mid.middle[0]),
-                       beyond_y = cy + Pack(mid.slope[1]) * cx - Pack(mid.middle[1]);
-            const auto inverse = inverse_widths(c);
-            const Pack a = share(beyond_x, hx, inverse[0]), b = share(beyond_y, hy, inverse[1]);
+            const Pack beyond_x = box.x + Pack(mid.slope[0]) * box.y - Pack(mid.middle[0]);
+            const Pack beyond_y = box.y + Pack(mid.slope[1]) * box.x - Pack(mid.middle[1]);
+            const Pack inverse = Pack(0.5) / (box.hx * box.hy);
+            const Pack a = share(beyond_x, box.hx, inverse * box.hy), b = share(beyond_y, box.hy, inverse * box.hx);
             d = d + a * coefficients[1] + b * coefficients[2] + (a * b) * coefficients[3];
             displace(hat(Pack(mid.stretch[0]) * beyond_x), hat(Pack(mid.stretch[1]) * beyond_y), dt, x, y);
         }
@@ -255,7 +254,7 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, const Strain
                                    [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                                    {
                                        Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
-                                       const Gradient<Pack> d = motion(frame.corner<Support>(q, p, lanes, x, y), dt, x, y);
+                                       const Gradient<Pack> d = motion(frame.box<Support>(q, p, lanes, x, y), dt, x, y);
                                        law.update(q, p, lanes, d);
                                        stretch<Support>(q, p, lanes, increment, d);
                                        lanes.store(&q.x[p], x);
