@@ -191,7 +191,7 @@ private:
                     a.column("j", "-", at, &NodeIndex::j);
                     a.nodal("velocity_x", "m/s", lattice, at, nodes_.vx);
                     a.nodal("velocity_y", "m/s", lattice, at, nodes_.vy);
-                    a.nodal("was_active", "-", lattice, at, was_active_);
+                    a.nodal("mass_before", "kg/m", lattice, at, mass_before_);
                 });
     }
 
@@ -201,7 +201,7 @@ private:
         if (lattice.numbered != grid_.lattice.numbered)
             renumber(lattice);
         nodes_.clear();
-        std::fill(was_active_.begin(), was_active_.end(), 0.0);
+        std::fill(mass_before_.begin(), mass_before_.end(), 0.0);
         std::fill(hourglass_x_.begin(), hourglass_x_.end(), 0.0);
         std::fill(hourglass_y_.begin(), hourglass_y_.end(), 0.0);
         std::vector<const Bins*> bins;
