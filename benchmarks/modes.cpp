@@ -47,7 +47,7 @@ struct Findings
     Spectrum spectrum;
     NullModes null;
     std::optional<double> critical;
-    double claimed = 0;                         ///< critical step by the method's own formula [s]
+    double claimed = 0;                                           ///< critical step by the method's own formula [s]
     std::vector<Mode> unstable, swinging, decaying, hardly_felt;  ///< swinging: the slowest first, or the nearest to a frequency
     int steps = 1;
     std::optional<double> frequency;
@@ -76,10 +76,10 @@ Findings find(const ModesOptions& options, const Scene& scene, Solver& solver)
     f.spectrum = spectrum(f.map.matrix);
     f.null = null_modes(f.map);
     for (const Mode& m : f.spectrum.modes)
-        (m.growth() > 1 + options.tolerance                                 ? f.unstable
-         : m.phase() == 0 || m.phase() > std::numbers::pi * (1 - hardly)    ? f.decaying
+        (m.growth() > 1 + options.tolerance                                  ? f.unstable
+         : m.phase() == 0 || m.phase() > std::numbers::pi * (1 - hardly)     ? f.decaying
          : m.phase() < hardly * f.steps && m.growth() > 1 - hardly * f.steps ? f.hardly_felt
-                                                                            : f.swinging)
+                                                                             : f.swinging)
             .push_back(m);
     std::stable_sort(f.swinging.begin(), f.swinging.end(),
                      [&](const Mode& a, const Mode& b)
@@ -130,13 +130,13 @@ std::string unknowns_text(const OneStepMap& map)
 std::string as_text(const Findings& f, const Scene& scene, const ModesOptions& options)
 {
     const double dt = f.start.dt;
-    std::string text = fmt::format("scene            {}\nmethod           {}\nstate            t = {:.6g} s after {} step{} of {:.6g} ms; {}\n",
-                                   scene.path, variant_label(scene), f.start.t, f.start.steps, f.start.steps == 1 ? "" : "s", 1e3 * dt,
-                                   unknowns_text(f.map));
-    text += fmt::format("map              of {} step{}, columns by differences of both sides; {}\n", f.steps, f.steps == 1 ? "" : "s",
-                        f.map.kinks == 0 ? "all are smooth"
-                                         : fmt::format("{} have a kink (a box or a point on a lattice line, a surface, yield): their mean",
-                                                       f.map.kinks));
+    std::string text = fmt::format(
+        "scene            {}\nmethod           {}\nstate            t = {:.6g} s after {} step{} of {:.6g} ms; {}\n", scene.path,
+        variant_label(scene), f.start.t, f.start.steps, f.start.steps == 1 ? "" : "s", 1e3 * dt, unknowns_text(f.map));
+    text += fmt::format(
+        "map              of {} step{}, columns by differences of both sides; {}\n", f.steps, f.steps == 1 ? "" : "s",
+        f.map.kinks == 0 ? "all are smooth"
+                         : fmt::format("{} have a kink (a box or a point on a lattice line, a surface, yield): their mean", f.map.kinks));
     if (scene.damping && scene.damping->local > 0)
         text += "                 local damping has no derivative where a velocity or a force is zero: of a state at rest the map is that "
                 "without damping\n";
@@ -157,11 +157,12 @@ std::string as_text(const Findings& f, const Scene& scene, const ModesOptions& o
     text += f.null.unseen == 0 ? "                 none is unseen, each moves the points\n"
                                : fmt::format("                 {} are unseen, they move no point; a step leaves {:.4g} of them\n",
                                              f.null.unseen, f.null.unseen_kept);
-    text += fmt::format("neutral          {} of the state's patterns stay as they are, {} more drift at a constant rate\n", f.spectrum.steady,
-                        f.spectrum.drifting);
+    text += fmt::format("neutral          {} of the state's patterns stay as they are, {} more drift at a constant rate\n",
+                        f.spectrum.steady, f.spectrum.drifting);
     text += fmt::format("unstable         {}\n{}", f.unstable.size(), f.unstable.empty() ? "" : table(f, f.unstable, options.top));
-    text += fmt::format("swinging         {}, {} first\n{}", f.swinging.size(), f.frequency ? "the nearest to the frequency" : "the slowest",
-                        f.swinging.empty() ? "" : table(f, f.swinging, options.top));
+    text +=
+        fmt::format("swinging         {}, {} first\n{}", f.swinging.size(), f.frequency ? "the nearest to the frequency" : "the slowest",
+                    f.swinging.empty() ? "" : table(f, f.swinging, options.top));
     if (f.frequency && !f.swinging.empty())
         text += fmt::format("  phase of the first over 2 pi f dt, less 1: {:.4g}\n", f.hertz(f.swinging[0]) / *f.frequency - 1);
     text += fmt::format("hardly felt      {} modes that turn by less than {} rad in a step\n", f.hardly_felt.size(), hardly);
@@ -199,9 +200,10 @@ std::string as_json(const Findings& f, const Scene& scene)
 {
     std::vector<std::string> modes;
     for (const Mode& m : f.spectrum.modes)
-        modes.push_back(fmt::format(R"({{"kind": "{}", "eigenvalue": [{}, {}], "growth_per_step": {}, "frequency": {}, "damping_ratio": {}}})",
-                                    kind(f, m), number(m.eigenvalue.real()), number(m.eigenvalue.imag()), number(f.per_step(m)),
-                                    number(f.hertz(m)), number(m.damping_ratio())));
+        modes.push_back(
+            fmt::format(R"({{"kind": "{}", "eigenvalue": [{}, {}], "growth_per_step": {}, "frequency": {}, "damping_ratio": {}}})",
+                        kind(f, m), number(m.eigenvalue.real()), number(m.eigenvalue.imag()), number(f.per_step(m)), number(f.hertz(m)),
+                        number(m.damping_ratio())));
     std::vector<std::string> lines;
     const auto add = [&](const char* name, const std::string& value) { lines.push_back(fmt::format("  \"{}\": {}", name, value)); };
     add("scene", quoted(scene.path));
@@ -296,7 +298,8 @@ void write_shapes(const std::string& path, const Findings& f, const Scene& scene
     for (std::size_t k = 0; k < few(f.unstable.size()); ++k)
         add("unstable", f.unstable[k].shape, f.per_step(f.unstable[k]), f.hertz(f.unstable[k]));
     for (std::size_t k = 0; k < few(static_cast<std::size_t>(f.null.shapes.cols())); ++k)
-        add(k < f.null.hourglass ? "hourglass" : "null", f.null.shapes.col(static_cast<Eigen::Index>(k)).cast<std::complex<double>>(), 1, 0);
+        add(k < f.null.hourglass ? "hourglass" : "null", f.null.shapes.col(static_cast<Eigen::Index>(k)).cast<std::complex<double>>(), 1,
+            0);
     for (std::size_t k = 0; k < few(f.swinging.size()); ++k)
         add("swinging", f.swinging[k].shape, f.per_step(f.swinging[k]), f.hertz(f.swinging[k]));
     file.commit();
@@ -312,7 +315,17 @@ std::optional<std::pair<std::string, std::string>> modes(const ModesOptions& opt
     if (std::string(find_variant(scene.method).family) == "fem")
         throw SceneError("modes: the FEM reference has no state that is stepped by particles; take an LPFDM or MPM method");
     const std::unique_ptr<Solver> solver = make_solver(scene);
-    const Findings f = find(options, scene, *solver);
+    const Findings f = [&]
+    {
+        try
+        {
+            return find(options, scene, *solver);
+        }
+        catch (const Diverged& e)
+        {
+            throw SceneError(fmt::format("{}: the run to --at {:.6g} s or a step from there fails: {}", scene.path, options.at, e.what()));
+        }
+    }();
     fmt::print("{}", options.json ? as_json(f, scene) : as_text(f, scene, options));
     if (output.empty())
         return std::nullopt;

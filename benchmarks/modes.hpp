@@ -9,12 +9,12 @@ namespace testbed
 {
 struct ModesOptions
 {
-    RunOptions scene;                ///< scene, method, overrides, output (.h5, .csv or .png), strict
-    double at = 0;                   ///< time of the state; at least one step is made, so that the leap-frog is started [s]
-    int steps = 1;                   ///< of the map
-    int top = 6;                     ///< modes that are shown of each sort
+    RunOptions scene;                 ///< scene, method, overrides, output (.h5, .csv or .png), strict
+    double at = 0;                    ///< time of the state; at least one step is made, so that the leap-frog is started [s]
+    int steps = 1;                    ///< of the map
+    int top = 6;                      ///< modes that are shown of each sort
     std::optional<double> frequency;  ///< of a mode that is sought, the exact one [Hz]
-    double tolerance = 1e-6;         ///< growth in the map that is not yet called unstable
+    double tolerance = 1e-6;          ///< growth in the map that is not yet called unstable
     bool leave_out_critical = false;
     bool json = false;
 };

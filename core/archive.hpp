@@ -1,7 +1,7 @@
 #pragma once
-/// The state of a solver, named once: a class lists what its next step depends on in `template <class Archive> void state(Archive&)`, in the
-/// manner of the describe() of a scene, and the archives here write it to memory and read it back to the same bits. What follows from the
-/// rest (sums, cells and nodes in use) is not listed but made again by who reads.
+/// The state of a solver, named once: a class lists what its next step depends on in `template <class Archive> void state(Archive&)`, in
+/// the manner of the describe() of a scene, and the archives here write it to memory and read it back to the same bits. What follows from
+/// the rest (sums, cells and nodes in use) is not listed but made again by who reads.
 
 #include "core/field.hpp"
 #include "core/grid.hpp"
@@ -64,7 +64,8 @@ public:
     void column(std::string_view name, std::string_view unit, std::vector<T>& list, Member member = {})
     {
         list.resize(self().size(list.size()));
-        self().part(name, unit, list.size(), [&](std::size_t k) -> auto& { return std::invoke(member, list[k]); });
+        self().part(
+            name, unit, list.size(), [&](std::size_t k) -> auto& { return std::invoke(member, list[k]); });
     }
     template <class T>
     void field(Field<T>& field, std::size_t count)
@@ -116,10 +117,9 @@ public:
     template <class Get>
     void part(std::string_view name, std::string_view, std::size_t count, Get&& get)
     {
-        if (next_ == from_.parts.size() || from_.parts[next_].name != group_name() + std::string(name) ||
-            from_.parts[next_].count != count)
-            throw std::logic_error(fmt::format("a state of another solver: '{}{}' with {} numbers is not its part {}", group_name(), name,
-                                               count, next_));
+        if (next_ == from_.parts.size() || from_.parts[next_].name != group_name() + std::string(name) || from_.parts[next_].count != count)
+            throw std::logic_error(
+                fmt::format("a state of another solver: '{}{}' with {} numbers is not its part {}", group_name(), name, count, next_));
         const std::span<const double> values = from_.of(next_++);
         for (std::size_t k = 0; k < count; ++k)
             get(k) = static_cast<std::remove_reference_t<decltype(get(k))>>(values[k]);

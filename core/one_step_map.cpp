@@ -16,19 +16,15 @@ struct Quantity
     int component;
 };
 /// Parts of the state that a step changes and the next one reads.
-constexpr std::array of_points{Quantity{"x", Unknown::Kind::position, 0},
-                               Quantity{"y", Unknown::Kind::position, 1},
-                               Quantity{"velocity_x", Unknown::Kind::velocity, 0},
-                               Quantity{"velocity_y", Unknown::Kind::velocity, 1},
-                               Quantity{"stress_xx", Unknown::Kind::stress, 0},
-                               Quantity{"stress_yy", Unknown::Kind::stress, 1},
-                               Quantity{"stress_xy", Unknown::Kind::stress, 2},
-                               Quantity{"stress_zz", Unknown::Kind::stress, 3},
-                               Quantity{"volume", Unknown::Kind::other, 0},
-                               Quantity{"half_width_x", Unknown::Kind::other, 0},
-                               Quantity{"half_width_y", Unknown::Kind::other, 1},
-                               Quantity{"plastic_shear_strain", Unknown::Kind::other, 0}};
-constexpr std::array of_nodes{Quantity{"velocity_x", Unknown::Kind::velocity, 0}, Quantity{"velocity_y", Unknown::Kind::velocity, 1}};
+constexpr std::array of_points{
+    Quantity{"x", Unknown::Kind::position, 0},          Quantity{"y", Unknown::Kind::position, 1},
+    Quantity{"velocity_x", Unknown::Kind::velocity, 0}, Quantity{"velocity_y", Unknown::Kind::velocity, 1},
+    Quantity{"stress_xx", Unknown::Kind::stress, 0},    Quantity{"stress_yy", Unknown::Kind::stress, 1},
+    Quantity{"stress_xy", Unknown::Kind::stress, 2},    Quantity{"stress_zz", Unknown::Kind::stress, 3},
+    Quantity{"volume", Unknown::Kind::other, 0},        Quantity{"half_width_x", Unknown::Kind::other, 0},
+    Quantity{"half_width_y", Unknown::Kind::other, 1},  Quantity{"plastic_shear_strain", Unknown::Kind::other, 0}};
+constexpr std::array of_nodes{Quantity{"velocity_x", Unknown::Kind::velocity, 0}, Quantity{"velocity_y", Unknown::Kind::velocity, 1},
+                              Quantity{"mass_before", Unknown::Kind::other, 0}};
 
 /// Where the unknowns stand in the states of one solver: points by their id, nodes by column and line, for both change their order.
 class Places
@@ -52,10 +48,10 @@ public:
         }
         if (!has_nodes_)
             return;
-        const std::size_t has_mass = about.find("node/was_active");
+        const std::size_t mass = about.find("node/mass_before");
         for (const Quantity& q : of_nodes)
             for (std::size_t k = 0; k < about.parts[node_i_].count; ++k)
-                if (about.of(has_mass)[k] > 0)
+                if (about.of(mass)[k] > 0)
                     places_.push_back({about.find(std::string("node/") + q.name), 0, 0, node(about, k), q, {}});
     }
 
@@ -122,10 +118,7 @@ private:
         Vec2 at;
     };
 
-    NodeIndex node(const State& s, std::size_t k) const
-    {
-        return {static_cast<int>(s.of(node_i_)[k]), static_cast<int>(s.of(node_j_)[k])};
-    }
+    NodeIndex node(const State& s, std::size_t k) const { return {static_cast<int>(s.of(node_i_)[k]), static_cast<int>(s.of(node_j_)[k])}; }
     static std::vector<std::size_t> by_id(const State& state, std::size_t id)
     {
         const auto ids = state.of(id);
@@ -160,17 +153,21 @@ double StateScales::of(const std::string& unit) const
         return velocity;
     if (unit == "Pa")
         return stress;
+    if (unit == "kg/m")
+        return mass;
     return unit == "m^2" ? length * length : 1;
 }
 
 StateScales state_scales(const std::vector<Body>& bodies, double cell_size)
 {
-    StateScales scales{cell_size, 0, 0};
+    StateScales scales{.length = cell_size};
     for (const Body& body : bodies)
     {
         const double M = moduli(body.material).constrained();
         scales.stress = std::max(scales.stress, M);
-        scales.velocity = std::max(scales.velocity, std::sqrt(M * body.points.initial_volume / body.points.mass));
+        const double density = body.points.mass / body.points.initial_volume;
+        scales.velocity = std::max(scales.velocity, std::sqrt(M / density));
+        scales.mass = std::max(scales.mass, density * cell_size * cell_size);
     }
     return scales;
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// The derivative of one step (or of some) of a solver with respect to its state, by differences of the steps that it really makes: the state
-/// is read, one number of it changed, the steps taken, the state written. No equation of a method stands here.
+/// The derivative of one step (or of some) of a solver with respect to its state, by differences of the steps that it really makes: the
+/// state is read, one number of it changed, the steps taken, the state written. No equation of a method stands here.
 
 #include "core/solver.hpp"
 
@@ -12,7 +12,7 @@ namespace testbed
 /// What a number of the state is measured by, so that a map without units has entries of order one.
 struct StateScales
 {
-    double length = 1, velocity = 1, stress = 1;  ///< L, the largest c_p, the largest M
+    double length = 1, velocity = 0, stress = 0, mass = 0;  ///< L, the largest c_p and M, that of a full cell
 
     double of(const std::string& unit) const;
 };
@@ -39,7 +39,7 @@ struct Unknown
 struct StepSettings
 {
     double t = 0, dt = 0;
-    int steps = 1;            ///< more: the map over all of them, about a state that moves by whole cells in them, for instance
+    int steps = 1;             ///< more: the map over all of them, about a state that moves by whole cells in them, for instance
     double difference = 1e-5;  ///< by which each unknown is changed, both ways, and by half of it, in its scale
 };
 

@@ -37,6 +37,8 @@ Index rank_of(const Matrix& a, double tolerance)
 /// Orthonormal columns that a maps to zero.
 Matrix null_space(const Matrix& a, double tolerance)
 {
+    if (a.size() == 0)  // nothing to map, or to nothing
+        return Matrix::Identity(a.cols(), a.cols());
     const Ranked transposed(a.transpose(), tolerance);
     const Matrix q = transposed.qr.householderQ();
     return q.rightCols(a.cols() - transposed.rank);

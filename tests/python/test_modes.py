@@ -86,3 +86,8 @@ def test_plot_refuses_another_file(tmp_path, capsys):
     (tmp_path / "x.h5").write_text("no")
     assert modes.main([str(tmp_path / "x.h5"), str(tmp_path / "x.png")]) == 1
     assert "error:" in capsys.readouterr().err
+
+
+def test_a_run_that_fails_on_the_way(scene):
+    done = run(scene, "--set", 'body.0.velocity=["100", "0"]', "--at", "1")
+    assert done.returncode == 1 and "left the lattice" in done.stderr and "--at 1 s" in done.stderr
