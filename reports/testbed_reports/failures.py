@@ -69,7 +69,10 @@ def cost_table(study):
 
 def cheapest(found, failure):
     """What to do about a class of failure, in one sentence."""
-    own = [c for c in found if c.failure == failure]
+    own = [c for c in found if c.failure == failure and c.without[1] and c.with_it[1]]
+    if own and all(c.without[0] == c.without[1] for c in own):
+        return "not needed by the runs of this study, which are sound without."
+    own = [c for c in own if c.without[0] < c.without[1]]
     good = sorted((c for c in own if c.holds), key=lambda c: c.time if math.isfinite(c.time) else math.inf)
     if good:
         c = good[0]
@@ -81,9 +84,12 @@ def cheapest(found, failure):
 
 
 def worst_run(study, where):
-    """The run of a class whose picture is shown: the worst one that has a snapshot, silent ones first; None when all are sound."""
+    """The run of a class whose picture is shown: the worst one that has a snapshot, of the case named first; None when all are sound."""
+    cases = where.get("case", [])
+    cases = cases if isinstance(cases, list) else [cases]
+    place = {name: -k for k, name in enumerate(cases)}
     bad = [r for r in study.select(where) if r.verdict.rank > 0 and r.result is not None and r.result.snapshots]
-    return max(bad, key=lambda r: (r.verdict.silent, r.verdict.rank, -r.verdict.time if math.isfinite(r.verdict.time) else -math.inf),
+    return max(bad, key=lambda r: (place.get(r.values.get("case"), 0), r.verdict.silent, r.verdict.rank, -r.verdict.time if math.isfinite(r.verdict.time) else -math.inf),
                default=None)
 
 

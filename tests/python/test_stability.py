@@ -287,6 +287,8 @@ def test_cost_beside_remedy(cases):
     assert cost.without == (0, 1) and cost.with_it == (1, 1) and cost.time == pytest.approx(1.5) and cost.memory == 1.0
     assert "at 1.50 times the time" in cheapest([cost], "stiff")
     assert cheapest([], "stiff") == "none tried here."
+    cost.without = (1, 1)
+    assert cheapest([cost], "stiff").startswith("not needed")
 
 
 def test_the_worst_run_stands_for_a_cell(tmp_path):
