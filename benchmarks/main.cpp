@@ -2,6 +2,7 @@
 #include "benchmarks/modes.hpp"
 #include "core/geometry.hpp"
 #include "core/method_limits.hpp"
+#include "core/observer.hpp"
 #include "core/point_driver.hpp"
 #include "core/provenance.hpp"
 #include "core/results.hpp"
@@ -84,6 +85,21 @@ std::string fields_and_modules(const Scene& scene, Solver& solver)
     return fmt::format("fields           {}\nmodules          {}\n", fmt::join(fields, ", "), fmt::join(modules, ", "));
 }
 
+/// What a run does before its first step. @throws SceneError where it would fail
+void try_first_sample(const Scene& scene, Solver& solver)
+{
+    try
+    {
+        solver.prepare(0, time_step(scene));
+        solver.update_points();
+        Observer(scene, solver).sample(0);
+    }
+    catch (const Diverged& e)
+    {
+        throw SceneError(fmt::format("{}: at the start: {}", scene.path, e.what()));
+    }
+}
+
 void check(const RunOptions& options, bool resolved)
 {
     const Scene scene = load_and_warn(options);
@@ -114,7 +130,7 @@ void check(const RunOptions& options, bool resolved)
         return;
     }
     const std::unique_ptr<Solver> solver = make_particle_solver(scene);
-    solver->prepare(0, time_step(scene));
+    try_first_sample(scene, *solver);
     fmt::print("cells in use     {}\nunknowns         {}\n{}", solver->active_cells(), solver->unknowns(),
                fields_and_modules(scene, *solver));
     fmt::print("bytes per point  {:.1f} (all arrays, {:.3g} MB)\n", static_cast<double>(solver->bytes()) / static_cast<double>(points),

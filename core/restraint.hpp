@@ -13,6 +13,8 @@ struct FacePair
 {
     NodeIndex low, high;
     double share;  ///< of `high` in the interpolation, in (0, 1)
+    double reach =
+        0;  ///< of soil whose mass sits in the middle of its points [cells]: so far beyond the nodes with mass it still lies at the face
 };
 
 /// Restrains one component, x or y, at some nodes.
@@ -52,7 +54,7 @@ public:
     struct Pair
     {
         std::uint32_t low, high;
-        double share;
+        double share, reach;
         std::uint16_t restraint, component;
     };
 

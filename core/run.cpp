@@ -3,6 +3,7 @@
 #include "core/method_limits.hpp"
 #include "core/observer.hpp"
 #include "core/provenance.hpp"
+#include "core/scene_trial.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -69,7 +70,7 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
     out.dt = solver.is_static() ? end : scene.time.dt ? *scene.time.dt : scene.time.cfl * solver.critical_time_step(scene);
     if (!(end / out.dt < 1e12))
         throw SceneError(fmt::format("{}: time.end = {:.4g} s takes more than 1e12 steps of {:.4g} s", scene.path, end, out.dt));
-    const auto total_steps = static_cast<std::int64_t>(std::ceil(end / out.dt * (1 - 1e-12)));
+    const auto total_steps = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(end / out.dt * (1 - 1e-12))));
     if (!scene.time.dt)
         out.dt = end / static_cast<double>(total_steps);
     const double history_interval = scene.output.history > 0 ? scene.output.history : end / 200;
@@ -228,6 +229,7 @@ Scene load_and_warn(const RunOptions& options)
         throw SceneError(fmt::format("{}", fmt::join(loaded.warnings, "\n")));
     for (const auto& w : loaded.warnings)
         fmt::print(stderr, "warning: {}\n", w);
+    try_expressions(loaded.scene);
     return std::move(loaded.scene);
 }
 

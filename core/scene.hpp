@@ -97,8 +97,8 @@ struct BodySpec
         v.optional("radius", radius, "m", "disk");
         v.optional("vertices", vertices, "m", "polygon: corners in order");
         v.optional("inside", inside, "", "an inclusion: takes those points of this other body that lie in its shape, and their size");
-        v.optional("velocity", velocity, "m/s", "initial velocity, two expressions of X, Y");
-        v.optional("initial_stress", initial_stress, "Pa", "four expressions of X, Y: xx, yy, zz, xy; such as K0 stress under gravity");
+        v.expression("velocity", velocity, "X, Y", "m/s", "initial velocity, two expressions");
+        v.expression("initial_stress", initial_stress, "X, Y", "Pa", "four expressions: xx, yy, zz, xy; such as K0 stress under gravity");
     }
 };
 
@@ -110,7 +110,7 @@ struct BoundarySpec
     void describe(V& v)
     {
         v.required("name", name, "", "name of the boundary");
-        v.expression("where", where, "", "condition on node positions x, y, such as \"y <= 0\"");
+        v.expression("where", where, "x, y", "", "condition on the positions of nodes, such as \"y <= 0\"");
         v.choice("fix", fix, {"x", "y", "xy"}, "velocity components held at zero; one component makes a roller");
     }
 };
@@ -128,14 +128,14 @@ struct WallSpec
     void describe(V& v)
     {
         v.required("name", name, "", "name of the wall; its reaction and displacement go into the history");
-        v.required("min", min, "m", "lower left corner at the start");
+        v.required("min", min, "m", "lower left corner at the start; half a cell of soil beside a wall moves with it, see docs/methods.md");
         v.required("max", max, "m", "upper right corner; equal to min in one coordinate makes a plate");
-        v.optional("velocity", velocity, "m/s", "two expressions of t; absent: an obstacle");
+        v.expression("velocity", velocity, "t", "m/s", "two expressions; absent: an obstacle");
         v.choice("fix", fix, {"x", "y", "xy"}, "velocity components that soil at the wall shares; xy is rough, one is smooth");
         v.choice("motion", motion, {"hand_off", "smooth"},
                  "hand_off: after each cell of travel the next line of nodes is driven, as published; smooth: the velocity interpolated "
-                 "at the wall's face is driven");
-        v.optional("door", door, "m", "an opening, from .. to along the longer side");
+                 "at the wall's face is driven; both pull soil that they leave");
+        v.optional("door", door, "m", "an opening, from .. to along the longer side; the soil half a cell within its ends is held");
         v.optional("door_opens", door_opens, "s", "time at which the door opens");
     }
 };
@@ -162,7 +162,7 @@ struct TractionSpec
         v.required("name", name, "", "name of the traction");
         v.required("body", body, "", "name of a box");
         v.choice("face", face, {"left", "right", "bottom", "top"}, "of the box; its outermost row of points carries the load");
-        v.required("traction", traction, "Pa", "two expressions of X, Y, t: force per area of the initial face");
+        v.expression("traction", traction, "X, Y, x, y, t", "Pa", "two expressions: force per area of the initial face");
     }
 };
 
@@ -173,7 +173,7 @@ struct BodyForceSpec
     template <class V>
     void describe(V& v)
     {
-        v.required("acceleration", acceleration, "m/s^2", "two expressions of X, Y, x, y, t, per unit mass");
+        v.expression("acceleration", acceleration, "X, Y, x, y, t", "m/s^2", "two expressions, per unit mass");
     }
 };
 
@@ -185,7 +185,7 @@ struct ProbeSpec
     void describe(V& v)
     {
         v.required("name", name, "", "name in the history");
-        v.expression("where", where, "", "condition on initial positions X, Y; the mean of these points is recorded");
+        v.expression("where", where, "X, Y", "", "condition on initial positions; the mean of these points is recorded");
     }
 };
 
@@ -198,8 +198,8 @@ struct ExactSpec
     template <class V>
     void describe(V& v)
     {
-        v.optional("displacement", displacement, "m", "two expressions of X, Y, t");
-        v.optional("stress", stress, "Pa", "four expressions of X, Y, t: xx, yy, zz, xy");
+        v.expression("displacement", displacement, "X, Y, x, y, t", "m", "two expressions");
+        v.expression("stress", stress, "X, Y, x, y, t", "Pa", "four expressions: xx, yy, zz, xy");
     }
 };
 
@@ -404,6 +404,14 @@ struct LoadedScene
 /// @param overrides "key.path=value" strings; list entries by number from 0 or by name.
 /// @throws SceneError
 LoadedScene load_scene(const std::string& path, const std::string& method = "", const std::vector<std::string>& overrides = {});
+/// What a scene may have at most: points have numbers of 32 bits, and some 150 bytes each.
+struct SceneBounds
+{
+    double points = 1e9, cells = 2e9;
+};
+/// The same from the text of a scene. @param path what messages call it, and what names its case
+LoadedScene load_scene_text(const std::string& text, const std::string& path, const std::string& method = "",
+                            const std::vector<std::string>& overrides = {}, const SceneBounds& bounds = {});
 
 std::string resolved_toml(const Scene& scene);
 /// Documentation of all tables, or of one. @throws SceneError for an unknown table.

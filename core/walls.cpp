@@ -4,15 +4,29 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <iterator>
+#include <limits>
 
 namespace testbed
 {
 namespace
 {
 constexpr double slack = 1e-6;  // cells
-}
 
-Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice) : spec_(spec), lattice_(lattice)
+/// How far soil lies beyond the nodes that its mass reaches [cells]: with boxes it lies where its mass does. Where all mass sits in
+/// the middle of a point, nodes beyond have none until a point passes the line of nodes before, half the points' distance behind a wall,
+/// and later where the soil is stretched: the whole distance is taken.
+double reach_of(const Scene& scene)
+{
+    const std::string& family = find_variant(scene.method).family;
+    const bool mass_in_the_middle = family == "mpm" ? scene.mpm.shape == "linear" : scene.lpfdm.support == "point";
+    int fewest = std::numeric_limits<int>::max();
+    for (const BodySpec& body : scene.bodies)
+        fewest = std::min(fewest, body.points_per_cell);
+    return mass_in_the_middle ? 1.0 / fewest : 0.0;
+}
+}  // namespace
+
+Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice) : spec_(spec), lattice_(lattice), reach_(reach_of(scene))
 {
     if (spec.velocity)
         velocity_.emplace(*spec.velocity, scene.expression_constants());
@@ -127,7 +141,7 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
                 Vec2 place = lattice_.node_position(low);
                 place[normal] = face;
                 if (!is_open_at(region, place))
-                    pairs.push_back({low, high, share});
+                    pairs.push_back({low, high, share, reach_});
             }
             if (is_plate)
                 break;

@@ -58,6 +58,7 @@ private:
 
     WallSpec spec_;
     Lattice lattice_;
+    double reach_;  ///< of the soil beyond the nodes that its mass reaches [cells]
     std::optional<VectorExpression> velocity_;
     Vec2 travel_{0, 0}, travel_rate_{0, 0};
     std::optional<Region> taken_;

@@ -121,14 +121,26 @@ def read_run(folder, entry):
     return run
 
 
+def _check_plan(path, plan):
+    """Raises StudyError when a plan is not what `testbed study` writes."""
+    lists = [plan.get(key, []) for key in ("runs", "left_out")] if isinstance(plan, dict) else [None]
+    if not all(isinstance(entries, list) and all(isinstance(e, dict) and isinstance(e.get("axes", {}), dict) for e in entries)
+               for entries in lists):
+        raise StudyError(f"{path}: is no plan of a study")
+    if not all(isinstance(entry.get("id"), str) for entry in plan.get("runs", [])):
+        raise StudyError(f"{path}: a run has no 'id'")
+
+
 def read_plan(folder):
     """plan.json of a study's folder; without one, every folder under runs/."""
     path = Path(folder) / PLAN
     if path.is_file():
         try:
-            return json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            plan = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError) as error:
             raise StudyError(f"{path}: cannot be read: {error}") from error
+        _check_plan(path, plan)
+        return plan
     runs = sorted(p.name for p in (Path(folder) / "runs").glob("*") if p.is_dir())
     return {"runs": [{"id": name} for name in runs], "left_out": []}
 

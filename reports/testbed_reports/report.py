@@ -24,6 +24,9 @@ def find_studies(folders):
     """Folders of studies: those given, or those inside a given one."""
     found = []
     for folder in map(Path, folders):
+        if folder.is_file():
+            raise StudyError(f"{folder}: is a file; a report takes the folder of a study, which `testbed study STUDY.toml -o DIR` "
+                             "makes of its runs. One result opens in ParaView by its .xdmf")
         if not folder.is_dir():
             raise StudyError(f"{folder}: no such folder")
         if (folder / "study.toml").is_file():
@@ -185,22 +188,26 @@ def _write_gallery(out, title, sections):
     return bool(shown)
 
 
-def build(folders, out, command):
-    """Writes the report of studies into the folder `out`; returns the path of the page."""
+def build(folders, out, command, unreadable=None):
+    """Writes the report of studies into the folder `out`; returns the path of the page. `unreadable`: a list for what could not be read."""
     out = Path(out)
     studies, failures = [], []
+    unreadable = [] if unreadable is None else unreadable
     for folder in find_studies(folders):
         try:
             studies.append(read_study_folder(folder))
         except StudyError as error:
             failures.append([folder.name, "the whole study", "unreadable",
                              str(error).replace(str(folder) + os.sep, "")])
+            unreadable.append(str(error))
     for name in ("figures", "tables"):
         (out / name).mkdir(parents=True, exist_ok=True)
     for study in studies:
         for run in study.runs:
             if not run.completed and not study.spec.cases:  # the matrix tells of these
                 failures.append([study.name, run.id, run.status, run.reason])
+            if run.status == "unreadable":
+                unreadable.append(f"{study.name}: {run.id}: {run.reason}")
             failures += [[study.name, run.id, "number missing", error] for error in run.errors]
     benches = [path for path in (Path(folder) / bench.FILE for folder in folders) if path.is_file()]
     style = Style(_figure_labels(studies) + _bench_labels(benches))
@@ -238,10 +245,14 @@ def main(arguments=None):
     except SystemExit as stop:
         return 1 if stop.code else 0
     out = Path(options.output) if options.output else Path(options.folders[0]).resolve().parent / "report"
+    unreadable = []
     try:
-        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]))
+        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]), unreadable)
     except (StudyError, OSError) as error:
         print(f"testbed report: {error}", file=sys.stderr)
         return 1
     print(os.path.relpath(page))
-    return 0
+    if unreadable:
+        more = f"\n  and {len(unreadable) - 20} more" if len(unreadable) > 20 else ""
+        print("testbed report: these could not be read, the report goes without them:\n  " + "\n  ".join(unreadable[:20]) + more, file=sys.stderr)
+    return 1 if unreadable else 0
