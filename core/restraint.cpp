@@ -96,12 +96,16 @@ void DrivenNodes::find(const std::vector<Restraint>& restraints, const Lattice& 
     }
 }
 
-void DrivenNodes::drive(const std::vector<Restraint>& restraints, const Nodes& carrier, std::vector<double>& vx,
-                        std::vector<double>& vy) const
+double DrivenNodes::drive(const std::vector<Restraint>& restraints, const Nodes& carrier, std::vector<double>& vx,
+                          std::vector<double>& vy) const
 {
     const std::array<std::vector<double>*, 2> velocity{&vx, &vy};
+    double work = 0;
     for (const Stage& stage : stages_)
     {
+        for (const Driven& d : stage.nodes)
+            if (const double own = restraints[d.restraint].components[d.component].velocity; own != 0)
+                work += carrier.mass[d.node] * (own - (*velocity[d.component])[d.node]) * own;
         parallel_for(
             stage.nodes.size(),
             [&](std::size_t n)
@@ -115,11 +119,14 @@ void DrivenNodes::drive(const std::vector<Restraint>& restraints, const Nodes& c
             std::vector<double>& v = *velocity[p.component];
             const auto [a, b] = weights(carrier, p);
             const double face = a * v[p.low] + b * v[p.high];
-            const auto [low, high] = impulse(carrier, p, restraints[p.restraint].components[p.component].velocity - face);
+            const double own = restraints[p.restraint].components[p.component].velocity;
+            const auto [low, high] = impulse(carrier, p, own - face);
             v[p.low] += low * inverse_mass(carrier, p.low);
             v[p.high] += high * inverse_mass(carrier, p.high);
+            work += (low + high) * own;
         }
     }
+    return work;
 }
 
 void DrivenNodes::react(std::vector<Restraint>& restraints, Nodes& nodes)
@@ -146,10 +153,12 @@ void DrivenNodes::react(std::vector<Restraint>& restraints, Nodes& nodes)
             restraints[p.restraint].reaction[p.component] += hold_face(nodes, p, *force[p.component]);
 }
 
-void DrivenNodes::hold_faces(Nodes& nodes) const
+double DrivenNodes::hold_faces(const std::vector<Restraint>& restraints, Nodes& nodes) const
 {
+    double power = 0;
     for (const Stage& stage : stages_)
         for (const Pair& p : stage.pairs)
-            hold_face(nodes, p, p.component == 0 ? nodes.fx : nodes.fy);
+            power += hold_face(nodes, p, p.component == 0 ? nodes.fx : nodes.fy) * restraints[p.restraint].components[p.component].velocity;
+    return power;
 }
 }  // namespace testbed

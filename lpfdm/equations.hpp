@@ -118,16 +118,19 @@ inline void cell_gradients(LpfdmGrid& grid, double dt)
 }
 
 /// Viscous force against the pattern (+1, -1, -1, +1), which no gradient sees and no linear field contains.
-/// The pattern decays at four times the rate. @param rate chi c_p / L [1/s] @param x, y one force per cell of the lattice
-inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& x, std::vector<double>& y)
+/// The pattern decays at four times the rate. Returns the power that it takes from the motion [W/m].
+/// @param rate chi c_p / L [1/s] @param x, y one force per cell of the lattice
+inline double resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& x, std::vector<double>& y)
 {
     const auto pattern = [](const std::array<Pack, 4>& v) { return v[0] - v[1] - v[2] + v[3]; };
-    grid.for_each_cell(
+    const double power = grid.sum_over_cells(
         [&](std::size_t c, std::size_t n, const auto& lanes)
         {
             const Pack f = Pack(-0.25 * rate) * lanes.load(&grid.cells.mass[c]);
-            lanes.store(&x[c], f * pattern(grid.at_corners(grid.nodes.vx, n, lanes)));
-            lanes.store(&y[c], f * pattern(grid.at_corners(grid.nodes.vy, n, lanes)));
+            const Pack hx = pattern(grid.at_corners(grid.nodes.vx, n, lanes)), hy = pattern(grid.at_corners(grid.nodes.vy, n, lanes));
+            lanes.store(&x[c], f * hx);
+            lanes.store(&y[c], f * hy);
+            return -f * (hx * hx + hy * hy);
         });
     grid.for_each_node(
         [&](std::size_t n, std::size_t first_cell, const auto& lanes)
@@ -138,6 +141,7 @@ inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& 
             add(grid.nodes.fx, x);
             add(grid.nodes.fy, y);
         });
+    return power;
 }
 
 /// Where the middle node of a bin meets its points when a share theta of the step has passed: K on the way x + alpha y of points, which the

@@ -71,16 +71,20 @@ public:
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         if (options_.hourglass > 0)
-            timer_("hourglass", [&]
-                   { resist_hourglass(grid_, options_.hourglass * wave_speed_ / grid_.lattice.cell_size, hourglass_x_, hourglass_y_); });
+            timer_("hourglass",
+                   [&]
+                   {
+                       const double rate = options_.hourglass * wave_speed_ / grid_.lattice.cell_size;
+                       node_ops_.note_hourglass(resist_hourglass(grid_, rate, hourglass_x_, hourglass_y_));
+                   });
         internal_ = force_norm(nodes_);
         timer_("node operations (11)(15)",
                [&]
                {
                    if (body_force_)
-                       add_body_force(t);
+                       node_ops_.apply_load(nodes_, [&] { add_body_force(t); });
                    if (tractions_)
-                       tractions_->apply(grid_.lattice, bodies_, nodes_, t);
+                       node_ops_.apply_load(nodes_, [&] { tractions_->apply(grid_.lattice, bodies_, nodes_, t); });
                    node_ops_.apply_forces(grid_.lattice, nodes_, t);
                });
         lag_ = started_ ? 0.5 * dt : 0;
@@ -92,7 +96,7 @@ public:
         timer_("acceleration (12)(14)",
                [&]
                {
-                   accelerate(nodes_, started_ ? dt : 0.5 * dt);
+                   node_ops_.kick(nodes_, started_ ? dt : 0.5 * dt);
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         if (faces_)
@@ -129,6 +133,12 @@ public:
 
     MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, lag_, internal_); }
 
+    PointMotion point_motion() const override
+    {
+        return point_motion_of(bodies_, [&](std::size_t body, std::size_t p) { return Lpfdm::velocity(body, p); });
+    }
+    std::optional<NodalWork> work() const override { return node_ops_.work(nodes_, lag_); }
+    std::pair<const Lattice*, const Nodes*> nodes() const override { return {&grid_.lattice, &nodes_}; }
     const std::vector<Body>& bodies() const override { return bodies_; }
 
     /// Bilinear, as eq. (6) moves the point.

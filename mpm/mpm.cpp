@@ -81,18 +81,14 @@ public:
                [&]
                {
                    if (body_force_)
-                       body_force_->template apply<Shape>(lattice_, bodies_, gather_, t,
-                                                          [&](std::size_t n, const std::array<double, 2>& f)
-                                                          {
-                                                              nodes_.fx[n] += f[0];
-                                                              nodes_.fy[n] += f[1];
-                                                          });
-                   fold_forces();
+                       node_ops_.apply_load(nodes_, [&] { add_body_force(t); });
                    if (tractions_)
-                   {
-                       tractions_->apply(lattice_, bodies_, nodes_, t);
-                       fold_forces();
-                   }
+                       node_ops_.apply_load(nodes_,
+                                            [&]
+                                            {
+                                                tractions_->apply(lattice_, bodies_, nodes_, t);
+                                                fold_forces();
+                                            });
                    node_ops_.apply_forces(lattice_, nodes_, t);
                });
         lag_ = started_ ? 0.5 * dt : 0;
@@ -116,7 +112,7 @@ public:
                    {
                        keep_velocity(carrier_x_, carrier_y_);
                        to_nodes<Scatter::momentum>(workspace_);
-                       node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy);
+                       node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy, false);
                        extend(nodes_.vx, nodes_.vy);
                    });
             timer_("points, material", [&] { move_points<true>(carrier_x_, carrier_y_, dt); });
@@ -130,7 +126,27 @@ public:
         node_ops_.end_step(dt);
     }
 
-    MotionSums sums() const override { return nodal_sums(lattice_, nodes_, lag_, internal_); }
+    /// The kinetic energy is that of the points: nodes see a part of it only.
+    MotionSums sums() const override
+    {
+        MotionSums s = nodal_sums(lattice_, nodes_, lag_, internal_);
+        const double points = point_motion().kinetic_energy;
+        s.kinetic_energy += points - s.kinetic_before;
+        s.kinetic_before = points;
+        return s;
+    }
+    PointMotion point_motion() const override
+    {
+        return point_motion_of(bodies_, [&](std::size_t body, std::size_t p) { return Mpm::velocity(body, p); });
+    }
+    /// With MUSL the strain is that of a velocity mapped once more, with XPIC the points move otherwise.
+    std::optional<NodalWork> work() const override
+    {
+        NodalWork work = node_ops_.work(nodes_, lag_);
+        work.of_strain = options_.scheme != "musl" && !xpic_;
+        return work;
+    }
+    std::pair<const Lattice*, const Nodes*> nodes() const override { return {&lattice_, &nodes_}; }
     const std::vector<Body>& bodies() const override { return bodies_; }
     Vec2 velocity(std::size_t body, std::size_t p) const override { return {bodies_[body].points.vx[p], bodies_[body].points.vy[p]}; }
     std::size_t unknowns() const override { return 2 * nodes_with_mass(nodes_); }
@@ -284,6 +300,16 @@ private:
         nodes_.vx[i] *= inverse;
         nodes_.vy[i] *= inverse;
     }
+    void add_body_force(double t)
+    {
+        body_force_->template apply<Shape>(lattice_, bodies_, gather_, t,
+                                           [&](std::size_t n, const std::array<double, 2>& f)
+                                           {
+                                               nodes_.fx[n] += f[0];
+                                               nodes_.fy[n] += f[1];
+                                           });
+        fold_forces();
+    }
     /// The nodes that do not count go to their neighbours; those that have none count all the same.
     void take_small_nodes(bool has_small)
     {
@@ -356,7 +382,7 @@ private:
     /// v += F / m dt; from here on the force holds the increment of the velocity.
     void accelerate_and_keep_increment(double dt)
     {
-        accelerate(nodes_, dt);
+        node_ops_.kick(nodes_, dt);
         node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy);
         if (node_ops_.restrains())
             nodes_.for_each(

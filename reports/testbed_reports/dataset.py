@@ -14,7 +14,7 @@ from .study_file import StudyError, matches, read_study
 from .verdicts import judge_study
 
 CSV_COLUMNS = ("run_id", "case", "method", "variant", "L", "ppc", "dt", "seed", "quantity", "norm", "value",
-               "solve_s", "particle_steps", "status")
+               "solve_s", "particle_steps", "status", "soundness", "cause", "remedy")
 PLAN = "plan.json"
 
 
@@ -40,6 +40,26 @@ class Run:
     @property
     def name(self):
         return self.values.get("variant") or self.id
+
+    @property
+    def suspect(self):
+        """Completed, and its guards say that the answer may be wrong."""
+        return self.completed and self.result is not None and self.result.soundness.startswith("suspect")
+
+    @property
+    def label(self):
+        """How it ended: the status, or 'suspect: CODE, ...'."""
+        return self.result.soundness if self.suspect else self.status
+
+    @property
+    def told(self):
+        """The reason, what the guards say, and what would help, as one text."""
+        if self.result is None:
+            return self.reason
+        parts = [self.reason, *self.result.suspect]
+        if self.result.cause:
+            parts.append(f"cause: {self.result.cause}" + (f", remedy: {self.result.remedy}" if self.result.remedy else ""))
+        return "; ".join(part for part in parts if part)
 
     def value(self, quantity, norm=""):
         """The metric, nan when the run has none."""
@@ -179,5 +199,5 @@ def metrics_csv(runs):
                              _number(run.values["L"]), run.values["ppc"], _number(run.values["dt"]),
                              run.values["seed"], quantity, norm, repr(float(value)),
                              _number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")),
-                             run.status])
+                             run.status, run.result.soundness, run.result.cause, run.result.remedy])
     return out.getvalue()

@@ -137,7 +137,7 @@ def _study_section(study, style, out, command, failures):
         tables = study_tables(study)
     for table in files:
         _write_table(out, study, table)
-    counts = Counter(run.status for run in study.runs)
+    counts = Counter("suspect" if run.suspect else run.status for run in study.runs)
     summary = f"{len(study.runs)} runs: " + ", ".join(f"{n} {status}" for status, n in counts.items()) + "."
     if study.left_out:
         summary += f" {len(study.left_out)} combinations left out."
@@ -204,8 +204,8 @@ def build(folders, out, command, unreadable=None):
         (out / name).mkdir(parents=True, exist_ok=True)
     for study in studies:
         for run in study.runs:
-            if not run.completed and not study.spec.cases:  # the matrix tells of these
-                failures.append([study.name, run.id, run.status, run.reason])
+            if (run.suspect or not run.completed) and not study.spec.cases:  # the matrix tells of these
+                failures.append([study.name, run.id, run.label, run.told])
             if run.status == "unreadable":
                 unreadable.append(f"{study.name}: {run.id}: {run.reason}")
             failures += [[study.name, run.id, "number missing", error] for error in run.errors]

@@ -162,6 +162,17 @@ class Result:
     variant = property(lambda self: self.root["variant"])
     status = property(lambda self: self.root["status"])
     reason = property(lambda self: self.root.get("reason", ""))
+    # What the guards of the run said; files of other codes, and older ones, say nothing.
+    suspect = property(lambda self: [line for line in self.root.get("suspect", "").splitlines() if line])
+    cause = property(lambda self: self.root.get("cause", ""))
+    remedy = property(lambda self: self.root.get("remedy", ""))
+
+    @property
+    def soundness(self):
+        """'sound', 'suspect: CODE, ...', or '' where the file does not tell."""
+        told = self.root.get("soundness", "")
+        codes = ", ".join(dict.fromkeys(line.split(":")[0] for line in self.suspect))
+        return f"{told}: {codes}" if told == "suspect" and codes else told
 
     @property
     def finished(self):
