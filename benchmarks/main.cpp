@@ -92,7 +92,7 @@ void try_first_sample(const Scene& scene, Solver& solver)
     {
         solver.prepare(0, time_step(scene));
         solver.update_points();
-        Observer(scene, solver).sample(0);
+        Observer(scene, solver).sample(0, time_step(scene));
     }
     catch (const Diverged& e)
     {
