@@ -73,10 +73,10 @@ void NodeOps::begin_step(double t, double dt)
     }
 }
 
-void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, double t)
+void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, const std::vector<double>& mass, double t)
 {
     if (gravity_)
-        gravity_->apply(nodes, t);
+        gravity_->apply(nodes, mass, t);
     find_driven(lattice, nodes);
     driven_.react(restraints_, nodes);
     if (!damping_)

@@ -25,13 +25,15 @@ struct Gravity
         return linear ? t / ramp : 0.5 * (1 - std::cos(std::numbers::pi * t / ramp));
     }
 
-    void apply(Nodes& nodes, double t) const
+    void apply(Nodes& nodes, double t) const { apply(nodes, nodes.mass, t); }
+    /// @param mass of the nodes, that has weight
+    void apply(Nodes& nodes, const std::vector<double>& mass, double t) const
     {
         const Pack gx(factor(t) * acceleration[0]), gy(factor(t) * acceleration[1]);
         nodes.for_each(
             [&](std::size_t i, const auto& lanes)
             {
-                const Pack m = lanes.load(&nodes.mass[i]);
+                const Pack m = lanes.load(&mass[i]);
                 lanes.store(&nodes.fx[i], lanes.load(&nodes.fx[i]) + gx * m);
                 lanes.store(&nodes.fy[i], lanes.load(&nodes.fy[i]) + gy * m);
             });
@@ -89,7 +91,9 @@ public:
             wall.end_step(dt);
     }
     /// Gravity, the reactions of supports and walls, and damping of what is then out of balance.
-    void apply_forces(const Lattice& lattice, Nodes& nodes, double t);
+    /// @param mass of the nodes, that has weight
+    void apply_forces(const Lattice& lattice, Nodes& nodes, const std::vector<double>& mass, double t);
+    void apply_forces(const Lattice& lattice, Nodes& nodes, double t) { apply_forces(lattice, nodes, nodes.mass, t); }
     /// Supports and walls prescribe the velocity.
     void restrain(const Lattice& lattice, const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy)
     {

@@ -34,6 +34,7 @@ PointSums point_sums(const std::vector<Body>& bodies)
     for (const Body& body : bodies)
     {
         const Points& q = body.points;
+        const double mass = q.mass * q.weight_share;
         const ElasticModuli base = moduli(body.material);
         const auto s =
             ordered_sum<3>(q.count,
@@ -42,7 +43,7 @@ PointSums point_sums(const std::vector<Body>& bodies)
                                const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
                                const double energy =
                                    elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}, out_of_plane_stress(base, q, p)) / softer;
-                               return std::array<double, 3>{energy * q.current_volume(p), q.mass * q.x[p], q.mass * q.y[p]};
+                               return std::array<double, 3>{energy * q.current_volume(p), mass * q.x[p], mass * q.y[p]};
                            });
         total.strain_energy += s[0];
         total.moment[0] += s[1];
@@ -255,7 +256,7 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     write("stress", "Pa", 6, [&](At at, Here) { return stress(at); });
     write("volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).current_volume(at.point)}; });
     write("initial_volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).initial_volume}; });
-    write("mass", "kg/m", 1, [&](At at, Here) { return Row1{points(at).mass}; });
+    write("mass", "kg/m", 1, [&](At at, Here) { return Row1{points(at).mass * points(at).weight_share}; });
     const auto any_active = [&](const Field<double> Points::*field)
     {
         const auto& bodies = solver_.bodies();

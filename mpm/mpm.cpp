@@ -1,10 +1,12 @@
 #include "mpm/mpm.hpp"
 
 #include "core/body_force.hpp"
+#include "core/density_scaling.hpp"
 #include "core/gather.hpp"
 #include "core/nonlocal.hpp"
 #include "core/tractions.hpp"
 #include "mpm/edges.hpp"
+#include "mpm/time_step.hpp"
 #include "mpm/transfer.hpp"
 
 #include <atomic>
@@ -33,11 +35,16 @@ public:
             tractions_.emplace(scene);
         if (has_nonlocal_softening(scene))
             nonlocal_.emplace(scene, lattice_.cell_size);
+        if (scene.time.density_scaling)
+            weight_.emplace();
+        if (scene.damping)
+            damping_ = scene.damping->local;
         rebuild();
     }
 
-    void prepare(double t, double dt) override
+    void do_prepare(const Step& step) override
     {
+        const auto [t, dt, last_dt] = step;
         node_ops_.begin_step(t, dt);
         timer_("bins",
                [&]
@@ -57,7 +64,7 @@ public:
                        restrain_mapped_velocity();
                    });
             if (started_)
-                timer_("stress", [&] { update_stress(dt); });
+                timer_("stress", [&] { update_stress(step.last_dt); });
             timer_("points to nodes", [&] { points_to_nodes<Scatter::force>(); });
         }
         else
@@ -73,7 +80,7 @@ public:
                [&]
                {
                    if (body_force_)
-                       body_force_->template apply<Shape>(lattice_, bodies_, gather_, t,
+                       body_force_->template apply<Shape>(lattice_, bodies_, gather_, step.t,
                                                           [&](std::size_t n, const std::array<double, 2>& f)
                                                           {
                                                               nodes_.fx[n] += f[0];
@@ -81,16 +88,18 @@ public:
                                                           });
                    fold_forces();
                    if (tractions_)
-                       tractions_->apply(lattice_, bodies_, nodes_, t);
-                   node_ops_.apply_forces(lattice_, nodes_, t);
+                       tractions_->apply(lattice_, bodies_, nodes_, step.t);
+                   if (weight_)
+                       find_weight();
+                   node_ops_.apply_forces(lattice_, nodes_, weight_ ? weight_->nodes : nodes_.mass, step.t);
                });
-        lag_ = started_ ? 0.5 * dt : 0;
+        lag_ = 0.5 * last_dt;
     }
 
-    void advance(double dt) override
+    void do_advance(const Step& step) override
     {
-        // the given initial velocity is that of t = 0: the first kick is half a step
-        timer_("acceleration", [&] { accelerate_and_keep_increment(started_ ? dt : 0.5 * dt); });
+        const double dt = step.dt;
+        timer_("acceleration", [&] { accelerate_and_keep_increment(step.kick()); });
         started_ = true;
         const bool remap = options_.scheme == "musl";
         timer_("nodes to points", [&] { update_velocity(remap); });
@@ -129,11 +138,23 @@ public:
         return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() + sums_.bytes() +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
                    sizeof(double) +
-               (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
+               (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) + (weight_ ? weight_->bytes() : 0);
     }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
+    std::vector<StepLimit> step_limits() override
+    {
+        if (std::exchange(moved_, false))
+            rebuild();
+        return mpm_step_limits<Shape>(lattice_, bodies_, options_, damping_);
+    }
+    std::optional<double> sharp_step_limit() override
+    {
+        ElementSystem elements = mpm_elements<Shape, Strain>(lattice_, bodies_);
+        fix(elements, node_ops_.restraints(), lattice_);
+        return mpm_sharp_limit(elements, options_, damping_);
+    }
 
 private:
     static constexpr int S = Shape::S;
@@ -162,6 +183,23 @@ private:
         if (options_.scheme != "usf")
             other_bins ? sums_.update(lattice_, bodies_) : sums_.update_changed(lattice_, bodies_);
         moved_ = false;
+    }
+
+    /// The masses of the nodes that have weight.
+    void find_weight()
+    {
+        weight_->nodes.assign(nodes_.mass.size(), 0.0);
+        const auto take = [&](std::size_t n, double mass) { weight_->nodes[n] = mass; };
+        if (options_.scheme == "usf")
+        {
+            points_to_nodes<Scatter::momentum>();  // the nodes' velocity is what it was: forces have not moved a point
+            restrain_mapped_velocity();
+            weight_->collect<sums_of<Scatter::momentum>>(bodies_, gather_, workspace_, S * S, take);
+        }
+        else
+            weight_->collect<sums_of<Scatter::momentum_and_force>>(bodies_, gather_, sums_.all(), S * S, take);
+        if constexpr (reaches_beyond)
+            edges_.fold_mass(weight_->nodes);
     }
 
     void renumber(const Lattice& to)
@@ -418,8 +456,9 @@ private:
     std::optional<BodyForce> body_force_;
     std::optional<Tractions> tractions_;
     std::optional<NonlocalStrain> nonlocal_;
+    std::optional<NodalWeight> weight_;
     PhaseTimer timer_;
-    double internal_ = 0, lag_ = 0;
+    double damping_ = 0, internal_ = 0, lag_ = 0;
     bool moved_ = false, started_ = false;
 };
 }  // namespace
