@@ -1,7 +1,7 @@
 #pragma once
 /// What limits the time step of LPFDM.
 
-#include "core/spectrum.hpp"
+#include "core/element_system.hpp"
 #include "core/time_step.hpp"
 #include "lpfdm/grid.hpp"
 

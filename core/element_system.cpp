@@ -1,4 +1,4 @@
-#include "core/spectrum.hpp"
+#include "core/element_system.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
