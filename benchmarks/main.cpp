@@ -1,6 +1,8 @@
 #include "benchmarks/bench.hpp"
+#include "benchmarks/modes.hpp"
 #include "core/geometry.hpp"
 #include "core/method_limits.hpp"
+#include "core/observer.hpp"
 #include "core/point_driver.hpp"
 #include "core/provenance.hpp"
 #include "core/results.hpp"
@@ -84,6 +86,21 @@ std::string fields_and_modules(const Scene& scene, Solver& solver)
     return fmt::format("fields           {}\nmodules          {}\n", fmt::join(fields, ", "), fmt::join(modules, ", "));
 }
 
+/// What a run does before its first step. @throws SceneError where it would fail
+void try_first_sample(const Scene& scene, Solver& solver)
+{
+    try
+    {
+        solver.prepare(0, time_step(scene, solver));
+        solver.update_points();
+        Observer(scene, solver).sample(0);
+    }
+    catch (const Diverged& e)
+    {
+        throw SceneError(fmt::format("{}: at the start: {}", scene.path, e.what()));
+    }
+}
+
 void check(const RunOptions& options, bool resolved)
 {
     const Scene scene = load_and_warn(options);
@@ -108,8 +125,8 @@ void check(const RunOptions& options, bool resolved)
     fmt::print("points           {}\n", points);
     if (is_fem)
     {
-        const double critical = critical_time_step(scene), dt = scene.time.dt ? *scene.time.dt : scene.time.cfl * critical;
-        fmt::print("time step        {:.5g} s, critical {:.5g} s, {:.0f} steps\n", dt, critical, std::ceil(scene.time.end / dt));
+        fmt::print("time step        {:.5g} s, critical {:.5g} s, {:.0f} steps\n", time_step(scene), critical_time_step(scene),
+                   std::ceil(scene.time.end / time_step(scene)));
         fmt::print("the FEM reference samples its solution at these points; it keeps no particle fields\n");
         return;
     }
@@ -122,7 +139,7 @@ void check(const RunOptions& options, bool resolved)
                std::ceil(scene.time.end / dt), description(solver->step_limits()));
     if (const auto sharp = solver->sharp_step_limit())
         fmt::print("sharp limit      {:.5g} s of stiffness, for the points as they stand at the start\n", *sharp);
-    solver->prepare(0, dt);
+    try_first_sample(scene, *solver);
     fmt::print("cells in use     {}\nunknowns         {}\n{}", solver->active_cells(), solver->unknowns(),
                fields_and_modules(scene, *solver));
     fmt::print("bytes per point  {:.1f} (all arrays, {:.3g} MB)\n", static_cast<double>(solver->bytes()) / static_cast<double>(points),
@@ -176,6 +193,20 @@ int run(int argc, char** argv)
     bench_command->add_option("--seconds", bench_options.seconds, "of each measurement, at most 3600");
     bench_command->add_option("-o,--output", bench_options.output,
                               "write a CSV file, too; named bench.csv in a folder given to `testbed report` it goes into the report");
+    ModesOptions modes_options;
+    CLI::App* modes_command = app.add_subcommand("modes", "what small disturbances of a state grow to: modes, null modes, critical step");
+    add_scene_options(*modes_command, modes_options.scene);
+    modes_command->add_option("--at", modes_options.at, "time of the state [s]; at least one step is made")->check(CLI::NonNegativeNumber);
+    modes_command->add_option("--steps", modes_options.steps, "steps of the map, such as those in which a body moves by a cell")
+        ->check(CLI::Range(1, 100000));
+    modes_command->add_option("--top", modes_options.top, "modes of each sort that are shown")->check(CLI::Range(1, 1000));
+    modes_command->add_option("--frequency", modes_options.frequency, "exact frequency of the mode that is shown first [Hz]")
+        ->check(CLI::PositiveNumber);
+    modes_command->add_option("--tolerance", modes_options.tolerance, "growth in the map that is not yet called unstable")
+        ->check(CLI::PositiveNumber);
+    modes_command->add_flag("--no-critical-step", modes_options.leave_out_critical, "leave out the bisection for the critical step");
+    modes_command->add_flag("--json", modes_options.json, "print JSON");
+    modes_command->add_option("-o,--output", modes_options.scene.output, "write shapes (.h5), a picture of them (.png) or a table (.csv)");
     app.add_subcommand("list", "methods and material laws");
     app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
     app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
@@ -213,6 +244,11 @@ int run(int argc, char** argv)
     }
     else if (bench_command->parsed())
         bench(bench_options, make_particle_solver);
+    else if (modes_command->parsed())
+    {
+        if (const auto picture = modes(modes_options, make_particle_solver))
+            become("testbed-modes-plot", {picture->first, picture->second});
+    }
     else if (doc_command->parsed())
         fmt::print("{}", scene_documentation(table));
     else

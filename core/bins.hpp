@@ -83,6 +83,23 @@ public:
         return is_first || has_new || has_lost;
     }
 
+    /// The marks, too: between two steps points may have left the bins in which they still stand.
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.column("i", "-", bins_, &Bin::i);
+        a.column("j", "-", bins_, &Bin::j);
+        a.column("begin", "-", bins_, &Bin::begin);
+        a.column("end", "-", bins_, &Bin::end);
+        a.column("marked", "-", marked_);
+        if constexpr (Archive::reads)
+        {
+            slots_ = without_numbers(lattice_);
+            before_.assign(bins_.size(), none);
+        }
+    }
+    bool has_marks() const { return std::find(marked_.begin(), marked_.end(), 1) != marked_.end(); }
+
     std::size_t bytes() const
     {
         return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + moves_.capacity() * sizeof(Move) +

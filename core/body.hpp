@@ -5,6 +5,8 @@
 #include "core/materials/material.hpp"
 #include "core/scene.hpp"
 
+#include <limits>
+
 namespace testbed
 {
 struct Body
@@ -15,6 +17,18 @@ struct Body
     Bins bins;
     double confinement = 0;      ///< pressure on free surfaces: forces come from the stress beyond it [Pa]
     double truncated_share = 0;  ///< of the random strengths drawn
+    double counted_volume = std::numeric_limits<double>::infinity();  ///< most of a point over which its stress counts [m^2]
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.group("body/" + name,
+                [&]
+                {
+                    points.state(a);
+                    a.group("bins", [&] { bins.state(a); });
+                });
+    }
 };
 
 /// What a method asks of each point beyond position and stress.

@@ -1,6 +1,10 @@
 #include "core/expression.hpp"
 
+#include "core/shown.hpp"
+
+#include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <muParser.h>
 #include <numbers>
 
@@ -8,8 +12,31 @@ namespace testbed
 {
 namespace
 {
+constexpr std::size_t longest = 5000;  // bytes of an expression
+
+/// Whether the text assigns, as in `y = 0`: a comparison that lost a sign, which would hold nowhere or everywhere.
+bool assigns(const std::string& text)
+{
+    for (std::size_t k = 0; k < text.size(); ++k)
+        if (text[k] == '=' && (k == 0 || std::string_view("<>=!").find(text[k - 1]) == std::string_view::npos) &&
+            (k + 1 == text.size() || text[k + 1] != '='))
+            return true;
+    return false;
+}
+
+[[noreturn]] void fail(const std::string& text, const std::string& why)
+{
+    throw ExpressionError("expression '" + shown(text) + "': " + why);
+}
+
 mu::Parser parser_with(const std::string& text, const Constants& constants)
 {
+    if (text.size() > longest)
+        fail(text, "longer than " + std::to_string(longest) + " bytes");
+    if (text.find('\0') != std::string::npos)
+        fail(text, "holds a zero byte");
+    if (assigns(text))
+        fail(text, "'=' assigns; to compare, write '=='");
     mu::Parser parser;
     parser.DefineConst("pi", std::numbers::pi);
     for (const auto& [name, value] : constants)
@@ -23,7 +50,29 @@ mu::Parser parser_with(const std::string& text, const Constants& constants)
     std::string message = e.GetMsg();
     while (!message.empty() && (message.back() == '\n' || message.back() == '.'))
         message.pop_back();
-    throw ExpressionError("expression '" + text + "': " + message);
+    fail(text, shown(message, 300));
+}
+
+/// Names of the variables that an expression depends on. @throws ExpressionError
+std::vector<std::string> variables_of(const std::string& text, const Constants& constants)
+{
+    try
+    {
+        const mu::Parser parser = parser_with(text, constants);
+        std::vector<std::string> names;
+        for (const auto& [name, address] : parser.GetUsedVar())
+            names.push_back(name);
+        return names;
+    }
+    catch (const mu::Parser::exception_type& e)
+    {
+        rethrow(text, e);
+    }
+}
+
+bool is_one_of(const std::string& name, std::string_view variables)
+{
+    return name.size() == 1 && variables.find(name) != std::string_view::npos;
 }
 }  // namespace
 
@@ -31,13 +80,14 @@ struct Expression::Impl
 {
     mu::Parser parser;
     Place place;
+    std::string text;
 };
 
 Expression::Expression(const std::string& text, const Constants& constants)
 {
     try
     {
-        impl_ = std::make_unique<Impl>(Impl{parser_with(text, constants), {}});
+        impl_ = std::make_unique<Impl>(Impl{parser_with(text, constants), {}, text});
         impl_->parser.DefineVar("X", &impl_->place.X);
         impl_->parser.DefineVar("Y", &impl_->place.Y);
         impl_->parser.DefineVar("x", &impl_->place.x);
@@ -45,7 +95,7 @@ Expression::Expression(const std::string& text, const Constants& constants)
         impl_->parser.DefineVar("t", &impl_->place.t);
         impl_->parser.Eval();  // compiles
         if (impl_->parser.GetNumResults() != 1)
-            throw ExpressionError("expression '" + text + "': one value is asked, not a list");
+            fail(text, "one value is asked, not a list");
     }
     catch (const mu::Parser::exception_type& e)
     {
@@ -66,8 +116,8 @@ double Expression::finite(const Place& place) const
 {
     const double value = (*this)(place);
     if (!std::isfinite(value))
-        throw ExpressionError("expression '" + impl_->parser.GetExpr() + "' is not finite at x = " + std::to_string(place.x) +
-                              " m, y = " + std::to_string(place.y) + " m");
+        throw ExpressionError(fmt::format("expression '{}' is not finite at x = {:.6g} m, y = {:.6g} m, t = {:.6g} s", shown(impl_->text),
+                                          place.x, place.y, place.t));
     return value;
 }
 
@@ -82,20 +132,17 @@ bool holds_near(const Expression& condition, double x, double y, double reach)
     return false;
 }
 
-std::string place_named_in(const std::string& text, const Constants& constants)
+bool depends_on(const std::string& text, const Constants& constants, std::string_view variables)
 {
-    try
-    {
-        const mu::Parser parser = parser_with(text, constants);
-        for (const auto& [name, address] : parser.GetUsedVar())
-            if (name == "X" || name == "Y" || name == "x" || name == "y")
-                return name;
-        return "";
-    }
-    catch (const mu::Parser::exception_type& e)
-    {
-        rethrow(text, e);
-    }
+    const auto names = variables_of(text, constants);
+    return std::any_of(names.begin(), names.end(), [&](const std::string& name) { return is_one_of(name, variables); });
+}
+
+void refuse_other_variables(const std::string& text, const Constants& constants, std::string_view allowed)
+{
+    for (const std::string& name : variables_of(text, constants))
+        if (is_one_of(name, all_variables) && !is_one_of(name, allowed))
+            fail(text, fmt::format("'{}' is not known here, only {} and constants", name, allowed));
 }
 
 double evaluate_constant(const std::string& text, const Constants& constants)
@@ -105,9 +152,9 @@ double evaluate_constant(const std::string& text, const Constants& constants)
         const mu::Parser parser = parser_with(text, constants);
         const double value = parser.Eval();
         if (parser.GetNumResults() != 1)
-            throw ExpressionError("expression '" + text + "': one value is asked, not a list (a decimal point is '.')");
+            fail(text, "one value is asked, not a list (a decimal point is '.')");
         if (!std::isfinite(value))
-            throw ExpressionError("expression '" + text + "': the value is not finite");
+            fail(text, "the value is not finite");
         return value;
     }
     catch (const mu::Parser::exception_type& e)

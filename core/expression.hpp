@@ -1,12 +1,13 @@
 #pragma once
 /// Text expressions of scenes, evaluated by muParser. They know X, Y (initial position), x, y (current position), t and the
-/// scene's constants. Not for use by several threads at once.
+/// scene's constants; what a scene may use of these where is said in its describe(). Not for use by several threads at once.
 
 #include "core/types.hpp"
 
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace testbed
@@ -46,8 +47,13 @@ private:
 /// @throws ExpressionError where it is not a number
 bool holds_near(const Expression& condition, double x, double y, double reach);
 
-/// The first of X, Y, x, y that an expression depends on; empty if there is none. @throws ExpressionError
-std::string place_named_in(const std::string& text, const Constants& constants);
+/// Every variable that expressions know.
+inline constexpr const char* all_variables = "X, Y, x, y, t";
+
+/// Whether an expression depends on one of the variables. @param variables such as "x, y" @throws ExpressionError
+bool depends_on(const std::string& text, const Constants& constants, std::string_view variables);
+/// @throws ExpressionError that names the first variable on which the expression depends beyond `allowed`, such as "x, y"
+void refuse_other_variables(const std::string& text, const Constants& constants, std::string_view allowed);
 
 /// Value of an expression of constants alone. @throws ExpressionError
 double evaluate_constant(const std::string& text, const Constants& constants);

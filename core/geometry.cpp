@@ -18,20 +18,25 @@ bool inside_polygon(const std::vector<Vec2>& v, const Vec2& p)
     return inside;
 }
 
-/// Centres of the squares of a body's pattern, whether in its shape or not.
-std::vector<Vec2> pattern(const BodySpec& body, const GridSpec& grid)
+/// Centres of the squares of a body's pattern that lie in a box, whether in its shape or not.
+std::vector<Vec2> pattern(const BodySpec& body, const GridSpec& grid, const std::array<Vec2, 2>& box)
 {
     const double h = spacing(body, grid);
-    Vec2 corner = grid.origin, extent = grid.size;
+    Vec2 corner = grid.origin, size = grid.size;
     if (body.shape == "box")
     {
         corner = *body.min;
-        extent = {(*body.max)[0] - corner[0], (*body.max)[1] - corner[1]};
+        size = {(*body.max)[0] - corner[0], (*body.max)[1] - corner[1]};
     }
-    const auto columns = std::llround(extent[0] / h), rows = std::llround(extent[1] / h);
+    std::array<long long, 2> from{}, to{};
+    for (std::size_t k = 0; k < 2; ++k)  // one more on either side, whatever the rounding
+    {
+        from[k] = std::max(0LL, static_cast<long long>(std::floor((box[0][k] - corner[k]) / h)) - 1);
+        to[k] = std::min(std::llround(size[k] / h), static_cast<long long>(std::ceil((box[1][k] - corner[k]) / h)) + 1);
+    }
     std::vector<Vec2> points;
-    for (long long j = 0; j < rows; ++j)
-        for (long long i = 0; i < columns; ++i)
+    for (long long j = from[1]; j < to[1]; ++j)
+        for (long long i = from[0]; i < to[0]; ++i)
             points.push_back({corner[0] + (static_cast<double>(i) + 0.5) * h, corner[1] + (static_cast<double>(j) + 0.5) * h});
     return points;
 }
@@ -45,6 +50,26 @@ bool contains(const BodySpec& body, const Vec2& p, double slack)
         return inside_polygon(body.vertices, p);
     return p[0] >= (*body.min)[0] - slack && p[0] <= (*body.max)[0] + slack && p[1] >= (*body.min)[1] - slack &&
            p[1] <= (*body.max)[1] + slack;
+}
+
+std::array<Vec2, 2> extent(const BodySpec& body)
+{
+    if (body.shape == "box")
+        return {*body.min, *body.max};
+    if (body.shape == "disk")
+    {
+        const Vec2& center = *body.center;
+        const double r = *body.radius;
+        return {Vec2{center[0] - r, center[1] - r}, Vec2{center[0] + r, center[1] + r}};
+    }
+    std::array<Vec2, 2> box{body.vertices[0], body.vertices[0]};
+    for (const Vec2& v : body.vertices)
+        for (std::size_t k = 0; k < 2; ++k)
+        {
+            box[0][k] = std::min(box[0][k], v[k]);
+            box[1][k] = std::max(box[1][k], v[k]);
+        }
+    return box;
 }
 
 std::vector<Vec2> outline(const BodySpec& body)
@@ -70,7 +95,7 @@ std::vector<Vec2> fill(const Scene& scene, const BodySpec& body)
     for (const BodySpec& other : scene.bodies)
         if (other.inside == host.name && !is_inclusion)
             inclusions.push_back(&other);
-    std::vector<Vec2> points = pattern(host, scene.grid);
+    std::vector<Vec2> points = pattern(host, scene.grid, extent(body));
     std::erase_if(points,
                   [&](const Vec2& p)
                   {
@@ -94,8 +119,10 @@ std::vector<std::uint32_t> numbers_without_inclusions(const Scene& scene, const 
 
 bool is_number(const std::string& text)
 {
+    if (text.empty() || text.find_first_not_of("0123456789+-.eE") != std::string::npos)  // a constant may be called nan
+        return false;
     char* stop = nullptr;
     std::strtod(text.c_str(), &stop);
-    return !text.empty() && *stop == '\0';
+    return *stop == '\0';
 }
 }  // namespace testbed

@@ -8,6 +8,9 @@ namespace testbed
 /// Whether a place lies in the body's shape, or within `slack` of a box or disk [m].
 bool contains(const BodySpec& body, const Vec2& place, double slack = 0);
 
+/// The corners, low and high, of the box around a body's shape [m].
+std::array<Vec2, 2> extent(const BodySpec& body);
+
 /// Places on the outline of a body's shape: its corners, or points around a disk.
 std::vector<Vec2> outline(const BodySpec& body);
 

@@ -54,6 +54,19 @@ struct Lattice
           numbered{0, 0, columns, rows}
     {
     }
+    /// Which part is numbered.
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.group("numbered",
+                [&]
+                {
+                    a.value("i0", "-", numbered.i0);
+                    a.value("j0", "-", numbered.j0);
+                    a.value("i1", "-", numbered.i1);
+                    a.value("j1", "-", numbered.j1);
+                });
+    }
     std::size_t cell_stride() const { return static_cast<std::size_t>(numbered.i1 - numbered.i0) + 4; }
     std::size_t node_stride() const { return static_cast<std::size_t>(numbered.i1 - numbered.i0) + 3; }
     std::size_t cell(int i, int j) const
@@ -69,6 +82,10 @@ struct Lattice
     bool has_node(int i, int j) const
     {
         return i >= numbered.i0 - 1 && i <= numbered.i1 + 1 && j >= numbered.j0 - 1 && j <= numbered.j1 + 1;
+    }
+    bool has_cell(int i, int j) const
+    {
+        return i >= numbered.i0 - 2 && i <= numbered.i1 + 1 && j >= numbered.j0 - 2 && j <= numbered.j1 + 1;
     }
     int cell_i(std::size_t c) const { return static_cast<int>(c % cell_stride()) - 2 + numbered.i0; }
     int cell_j(std::size_t c) const { return static_cast<int>(c / cell_stride()) - 2 + numbered.j0; }
@@ -172,6 +189,12 @@ public:
     void for_each(Kernel&& kernel) const
     {
         for_each_run(runs_, [&](const Run& run) TESTBED_FLATTEN { for_each_pack(run.begin, run.begin + run.count, kernel); });
+    }
+    /// Zero everywhere: for other values to be read.
+    void clear()
+    {
+        for (auto* values : {&mass, &vx, &vy, &fx, &fy})
+            std::fill(values->begin(), values->end(), 0.0);
     }
     std::size_t bytes() const
     {

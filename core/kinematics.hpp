@@ -2,14 +2,46 @@
 /// Gauss's theorem on a cell (eqs. (1)-(5)) and the nodal forces dual to it (eq. (9)). The polygon forms hold for any cell;
 /// the square is their fast case, with nodes [1]..[4] in the numbering of grid.hpp.
 
+#include "core/simd.hpp"
 #include "core/types.hpp"
 
 #include <array>
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace testbed
 {
+/// Strain, rotation and stretch of a step from the displacement gradient G over the configuration at its start: G (I + theta G)^-1, the
+/// gradient over the configuration at theta (generalised midpoint rule, Hughes & Winget 1980). theta = 1/2 is second order: an increment of
+/// rotation strains nothing, a stretch and its inverse cancel; theta = 0 leaves G, first order.
+struct StrainIncrement
+{
+    double theta = 0.5;
+
+    /// The inverse of the determinant is taken as 1 - e + e^2: what is left out is of third order in the strain of one step, as is what the
+    /// midpoint itself leaves out, and a division costs as much as all else.
+    template <class T>
+    TESTBED_INLINE Gradient<T> of(const Gradient<T>& g) const
+    {
+        const T det = g.xx * g.yy - g.xy * g.yx, share(theta), half = share * det;
+        const T e = share * (g.trace() + half), inverse = T(1.0) - e * (T(1.0) - e);
+        return {(g.xx + half) * inverse, (g.yy + half) * inverse, g.xy * inverse, g.yx * inverse};
+    }
+    /// Ratio of new to old length, or volume, for an increment of strain, or its trace, by of().
+    template <class T>
+    TESTBED_INLINE T stretch(const T& d) const
+    {
+        return T(1.0) + d * (T(1.0) + T(theta) * d);
+    }
+};
+
+/// @param name of a scene's `increment`
+inline StrainIncrement strain_increment(std::string_view name)
+{
+    return {name == "forward" ? 0.0 : 0.5};
+}
+
 /// Area of a polygon whose corners run anticlockwise [m^2].
 inline double polygon_area(std::span<const Vec2> x)
 {

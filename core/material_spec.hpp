@@ -16,8 +16,8 @@ struct StrengthSpec
     template <class V>
     void describe(V& v)
     {
-        v.expression("cohesion", cohesion, "Pa", "number, or expression of the initial position X, Y");
-        v.expression("friction_angle", friction_angle, "rad", "number, or expression of the initial position X, Y; in [0, pi/2)");
+        v.expression("cohesion", cohesion, "X, Y", "Pa", "number, or expression of the initial position");
+        v.expression("friction_angle", friction_angle, "X, Y", "rad", "number, or expression of the initial position; in [0, pi/2)");
         v.optional("dilatancy_angle", dilatancy_angle, "rad", "from 0 to the friction angle");
         v.optional("tensile_strength", tensile_strength, "Pa", "no principal stress exceeds it; absent: the apex is the limit");
     }
@@ -96,7 +96,7 @@ struct MaterialSpec
         v.required("name", name, "", "referred to by bodies");
         v.choice("law", law, laws(), "plane-strain law");
         v.required("density", density, "kg/m^3", "initial density");
-        v.expression("youngs_modulus", youngs_modulus, "Pa", "number, or expression of the initial position X, Y");
+        v.expression("youngs_modulus", youngs_modulus, "X, Y", "Pa", "number, or expression of the initial position");
         v.required("poissons_ratio", poissons_ratio, "-", "in (-1, 1/2)");
         v.table("strength", strength, "of mohr_coulomb");
         v.table("softening", softening, "of the cohesion");

@@ -37,4 +37,9 @@ double critical_time_step(const Scene& scene)
     return limit / std::sqrt(1 + (scene.damping ? scene.damping->local : 0));
 }
 
+double time_step(const Scene& scene)
+{
+    return scene.time.dt ? *scene.time.dt : scene.time.cfl * critical_time_step(scene);
+}
+
 }  // namespace testbed

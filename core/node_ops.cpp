@@ -60,6 +60,7 @@ NodeOps::NodeOps(const Scene& scene, const Lattice& lattice)
 
 void NodeOps::begin_step(double t, double dt)
 {
+    power_ = {};
     for (std::size_t k = 0; k < walls_.size(); ++k)
     {
         Restraint& own = restraints_[first_wall_ + k];
@@ -73,16 +74,53 @@ void NodeOps::begin_step(double t, double dt)
     }
 }
 
-void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, const std::vector<double>& mass, double t)
+void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, double t)
 {
     if (gravity_)
-        gravity_->apply(nodes, mass, t);
+    {
+        gravity_->apply(nodes, weight_of(nodes), t);
+        const double factor = gravity_->factor(t);
+        gravity_now_ = {factor * gravity_->acceleration[0], factor * gravity_->acceleration[1]};
+    }
     find_driven(lattice, nodes);
     driven_.react(restraints_, nodes);
+    for (const Restraint& r : restraints_)
+        for (std::size_t k = 0; k < 2; ++k)
+            power_.restraints += r.reaction[k] * r.components[k].velocity;
     if (!damping_)
         return;
-    damping_->apply(nodes);
-    driven_.hold_faces(nodes);  // what damping puts on the nodes of a face must not move the wall
+    power_.damping = damping_->apply(nodes);
+    power_.restraints += driven_.hold_faces(restraints_, nodes);  // what damping puts on the nodes of a face must not move the wall
+}
+
+void NodeOps::add_work(const Kick& kick, double dt, double before, NodalWork& work) const
+{
+    work.kick += kick.work;
+    work.gravity += gravity_now_[0] * kick.transport[0] + gravity_now_[1] * kick.transport[1];
+    work.restraints += power_.restraints * dt;
+    work.loads += power_.loads * before;
+    work.damping += power_.damping * before;
+    work.hourglass += power_.hourglass * before;
+}
+
+void NodeOps::kick(Nodes& nodes, double dt)
+{
+    add_work(accelerate(nodes, weight_of(nodes), dt), dt, started_ ? dt : 0, work_);
+    started_ = true;
+}
+
+NodalWork NodeOps::work(const Nodes& nodes, double lag) const
+{
+    const std::vector<double>& mass = weight_of(nodes);
+    const auto momentum = sum_over_nodes<2>(nodes,
+                                            [&](std::size_t i, const auto& lanes)
+                                            {
+                                                const Pack m = lanes.load(&mass[i]);
+                                                return std::array{m * lanes.load(&nodes.vx[i]), m * lanes.load(&nodes.vy[i])};
+                                            });
+    NodalWork now = work_;
+    add_work({lag * nodal_power(nodes), {lag * momentum[0], lag * momentum[1]}}, lag, 2 * lag, now);
+    return now;
 }
 
 std::vector<RestraintRecord> NodeOps::records() const

@@ -1,6 +1,7 @@
 #pragma once
 /// Operations at nodes, common to LPFDM and MPM: what a scene does not have is absent from the lists.
 
+#include "core/nodal_work.hpp"
 #include "core/parallel.hpp"
 #include "core/walls.hpp"
 
@@ -50,23 +51,49 @@ struct LocalDamping
 {
     double alpha;
 
-    Pack damped(Pack force, Pack velocity) const
+    Pack resistance(Pack force, Pack velocity) const
     {
-        Pack resistance = Pack(alpha) * max(force, -force);
-        stdx::where(velocity == Pack(0.0), resistance) = Pack(0.0);
-        stdx::where(velocity < Pack(0.0), resistance) = -resistance;
-        return force - resistance;
+        Pack size = Pack(alpha) * max(force, -force);
+        stdx::where(velocity == Pack(0.0), size) = Pack(0.0);
+        stdx::where(velocity < Pack(0.0), size) = -size;
+        return size;
     }
-    void apply(Nodes& nodes) const
+    Pack damped(Pack force, Pack velocity) const { return force - resistance(force, velocity); }
+    /// Returns the power that it takes from the motion, at the velocity before the kick [W/m].
+    double apply(Nodes& nodes) const
     {
-        nodes.for_each(
-            [&](std::size_t i, const auto& lanes)
-            {
-                lanes.store(&nodes.fx[i], damped(lanes.load(&nodes.fx[i]), lanes.load(&nodes.vx[i])));
-                lanes.store(&nodes.fy[i], damped(lanes.load(&nodes.fy[i]), lanes.load(&nodes.vy[i])));
-            });
+        return sum_over_nodes<1>(nodes,
+                                 [&](std::size_t i, const auto& lanes)
+                                 {
+                                     const Pack fx = lanes.load(&nodes.fx[i]), fy = lanes.load(&nodes.fy[i]);
+                                     const Pack vx = lanes.load(&nodes.vx[i]), vy = lanes.load(&nodes.vy[i]);
+                                     const Pack rx = resistance(fx, vx), ry = resistance(fy, vy);
+                                     lanes.store(&nodes.fx[i], fx - rx);
+                                     lanes.store(&nodes.fy[i], fy - ry);
+                                     return std::array{rx * vx + ry * vy};
+                                 })[0];
     }
 };
+
+/// Eqs. (12), (14): v += F / m dt. Returns the work of the forces. @param weight: mass of the nodes, that has weight
+inline Kick accelerate(Nodes& nodes, const std::vector<double>& weight, double dt)
+{
+    const Pack half(0.5);
+    const auto s = sum_over_nodes<3>(nodes,
+                                     [&](std::size_t i, const auto& lanes)
+                                     {
+                                         const Pack step = inverse_mass(nodes, i, lanes) * Pack(dt), m = lanes.load(&nodes.mass[i]);
+                                         const Pack fx = lanes.load(&nodes.fx[i]), fy = lanes.load(&nodes.fy[i]);
+                                         const Pack vx = lanes.load(&nodes.vx[i]), vy = lanes.load(&nodes.vy[i]);
+                                         const Pack dx = fx * step, dy = fy * step;
+                                         lanes.store(&nodes.vx[i], vx + dx);
+                                         lanes.store(&nodes.vy[i], vy + dy);
+                                         const Pack mean_x = vx + half * dx, mean_y = vy + half * dy;
+                                         const Pack w = lanes.load(&weight[i]);
+                                         return std::array{m * (dx * mean_x + dy * mean_y), w * mean_x, w * mean_y};
+                                     });
+    return {s[0], {dt * s[1], dt * s[2]}};
+}
 
 /// What is recorded of a support or a wall.
 struct RestraintRecord
@@ -82,6 +109,8 @@ public:
     /// @throws SceneError when a boundary takes no node
     NodeOps(const Scene& scene, const Lattice& lattice);
 
+    /// Gravity takes these masses of the nodes for those that have weight, from now on.
+    void weigh_with(const std::vector<double>& mass) { weight_ = &mass; }
     /// Takes the walls to time t, and to their velocity in the coming step.
     /// @throws Diverged when a wall has left the lattice or has reached what stands in its way
     void begin_step(double t, double dt);
@@ -91,20 +120,45 @@ public:
             wall.end_step(dt);
     }
     /// Gravity, the reactions of supports and walls, and damping of what is then out of balance.
-    /// @param mass of the nodes, that has weight
-    void apply_forces(const Lattice& lattice, Nodes& nodes, const std::vector<double>& mass, double t);
-    void apply_forces(const Lattice& lattice, Nodes& nodes, double t) { apply_forces(lattice, nodes, nodes.mass, t); }
-    /// Supports and walls prescribe the velocity.
-    void restrain(const Lattice& lattice, const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy)
+    void apply_forces(const Lattice& lattice, Nodes& nodes, double t);
+    /// Supports and walls prescribe the velocity. @param counts whether the motion of the soil takes over what that changes
+    void restrain(const Lattice& lattice, const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy, bool counts = true)
     {
         find_driven(lattice, nodes);
-        driven_.drive(restraints_, nodes, vx, vy);
+        if (const double work = driven_.drive(restraints_, nodes, vx, vy); counts)
+            work_.restraints += work;
+    }
+    /// Runs load(), which adds forces of the outside, and notes their power.
+    template <class Load>
+    void apply_load(const Nodes& nodes, Load&& load)
+    {
+        power_.loads -= nodal_power(nodes);
+        load();
+        power_.loads += nodal_power(nodes);
+    }
+    /// Power that hourglass control takes from the motion in the coming step [W/m].
+    void note_hourglass(double power) { power_.hourglass = power; }
+    /// Accelerates, and adds up the work of all forces.
+    void kick(Nodes& nodes, double dt);
+    /// Work up to the time of the forces, `lag` seconds after that of the nodes' velocity.
+    NodalWork work(const Nodes& nodes, double lag) const;
+    /// Of the walls: all else is as the scene says.
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for (std::size_t k = 0; k < walls_.size(); ++k)
+            a.group("wall/" + restraints_[first_wall_ + k].name, [&] { walls_[k].state(a, restraints_[first_wall_ + k]); });
+        if constexpr (Archive::reads)
+            seen_ = 0;
     }
     bool restrains() const { return !restraints_.empty(); }
     std::vector<RestraintRecord> records() const;
     const std::vector<Restraint>& restraints() const { return restraints_; }
 
 private:
+    const std::vector<double>& weight_of(const Nodes& nodes) const { return weight_ ? *weight_ : nodes.mass; }
+    /// @param before the step in the middle of which the nodes' velocity was, as long as the powers hold
+    void add_work(const Kick& kick, double dt, double before, NodalWork& work) const;
     void find_driven(const Lattice& lattice, const Nodes& nodes)
     {
         if (nodes.version() == seen_)
@@ -114,25 +168,17 @@ private:
     }
 
     std::optional<Gravity> gravity_;
+    const std::vector<double>* weight_ = nullptr;  ///< null: all mass has weight
     std::optional<LocalDamping> damping_;
     std::vector<Restraint> restraints_;  ///< of the boundaries, then of the walls: where two prescribe, the later one does
     std::vector<Wall> walls_;
     std::size_t first_wall_ = 0;
     DrivenNodes driven_;
+    NodalWork work_, power_;  ///< power: of the coming step, where it is not known to the kick [W/m]
+    Vec2 gravity_now_{0, 0};
+    bool started_ = false;  ///< the velocity is no longer that of t = 0
     std::size_t seen_ = 0;  ///< version of the nodes for which driven_ was found; 0: none
 };
-
-/// Eqs. (12), (14): v += F / m dt.
-inline void accelerate(Nodes& nodes, double dt)
-{
-    nodes.for_each(
-        [&](std::size_t i, const auto& lanes)
-        {
-            const Pack step = inverse_mass(nodes, i, lanes) * Pack(dt);
-            lanes.store(&nodes.vx[i], lanes.load(&nodes.vx[i]) + lanes.load(&nodes.fx[i]) * step);
-            lanes.store(&nodes.vy[i], lanes.load(&nodes.vy[i]) + lanes.load(&nodes.fy[i]) * step);
-        });
-}
 
 inline double force_norm(const Nodes& nodes)
 {

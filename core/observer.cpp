@@ -9,13 +9,6 @@ namespace testbed
 {
 namespace
 {
-/// Sums over all points of all bodies: strain energy [J/m] and sum of m x [kg].
-struct PointSums
-{
-    double strain_energy = 0, max_stress = 0;
-    Vec2 moment{0, 0};
-};
-
 /// Initial positions of all points, by id. Points need not carry them: they follow from the scene.
 std::vector<Vec2> initial_positions(const Scene& scene)
 {
@@ -28,37 +21,18 @@ std::vector<Vec2> initial_positions(const Scene& scene)
     return all;
 }
 
-PointSums point_sums(const std::vector<Body>& bodies)
+bool has_strength(const Scene& scene)
 {
-    PointSums total;
-    for (const Body& body : bodies)
-    {
-        const Points& q = body.points;
-        const double mass = q.mass * q.weight_share;
-        const ElasticModuli base = moduli(body.material);
-        const auto s =
-            ordered_sum<3>(q.count,
-                           [&](std::size_t p)
-                           {
-                               const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
-                               const double energy =
-                                   elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}, out_of_plane_stress(base, q, p)) / softer;
-                               return std::array<double, 3>{energy * q.current_volume(p), mass * q.x[p], mass * q.y[p]};
-                           });
-        total.strain_energy += s[0];
-        total.moment[0] += s[1];
-        total.moment[1] += s[2];
-        total.max_stress =
-            std::max(total.max_stress, parallel_max(q.count,
-                                                    [&](std::size_t p) {
-                                                        return std::max({std::abs(q.sxx[p]), std::abs(q.syy[p]), std::abs(q.sxy[p])});
-                                                    }));
-    }
-    return total;
+    return std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                       [&](const BodySpec& body) { return scene.material(body.material).has_strength(); });
 }
 }  // namespace
 
-Observer::Observer(const Scene& scene, const Solver& solver) : scene_(scene), solver_(solver)
+Observer::Observer(const Scene& scene, const Solver& solver)
+    : scene_(scene),
+      solver_(solver),
+      lattice_(make_lattice(scene.grid)),
+      ledger_(has_strength(scene), scene.confinement ? scene.confinement->pressure : 0)
 {
     const Constants constants = scene.expression_constants();
     if (const auto found = scene.exact.find(solver.kinematics()); found != scene.exact.end())
@@ -72,7 +46,7 @@ Observer::Observer(const Scene& scene, const Solver& solver) : scene_(scene), so
     }
     if (scene.gravity)
         gravity_ = make_gravity(*scene.gravity);
-    last_moment_ = point_sums(solver.bodies()).moment;
+    last_moment_ = point_sums(solver.bodies(), lattice_).moment;
     const std::vector<Vec2> initial = initial_positions(scene);
     for (const ProbeSpec& spec : scene.probes)
     {
@@ -134,21 +108,34 @@ std::array<double, 3> Observer::exact_displacement(const Place& at) const
     return {exact_.displacement[0](at), exact_.displacement[1](at), 0};
 }
 
-void Observer::sample(double t)
+double Observer::gravity_work(double t, const Vec2& moment)
+{
+    const double f = 0.5 * (gravity_->factor(last_time_) + gravity_->factor(t));
+    for (std::size_t k = 0; k < 2; ++k)
+        gravity_work_ += f * gravity_->acceleration[k] * (moment[k] - last_moment_[k]);
+    last_time_ = t;
+    last_moment_ = moment;
+    return gravity_work_;
+}
+
+const GuardSample& Observer::sample(double t, double dt, bool fresh)
 {
     const MotionSums motion = solver_.sums();
-    const PointSums state = point_sums(solver_.bodies());
+    const PointSums state = point_sums(solver_.bodies(), lattice_);
     if (!std::isfinite(motion.kinetic_energy) || !std::isfinite(state.strain_energy))
         throw Diverged(fmt::format("energy is not finite at t = {:.6g} s", t));
     if (gravity_)
     {
-        const double f = 0.5 * (gravity_->factor(last_time_) + gravity_->factor(t));
-        for (std::size_t k = 0; k < 2; ++k)
-            gravity_work_ += f * gravity_->acceleration[k] * (state.moment[k] - last_moment_[k]);
+        gravity_work(t, state.moment);
         add(history_, "gravity_factor", "-", gravity_->factor(t));
     }
-    last_time_ = t;
-    last_moment_ = state.moment;
+    const Stopwatch watch;
+    const auto work = solver_.work();
+    const double plastic = work && !work->of_strain ? plastic_.add(solver_.bodies()) : 0;
+    last_ = {t,      dt,    ledger_.at(motion.kinetic_energy, state, work, plastic), 0,
+             motion, state, fresh ? solver_.point_motion() : last_.point_motion,     fresh};
+    last_.energy_scale = ledger_.scale();
+    guard_seconds_ += watch.seconds();
     add(history_, "time", "s", t);
     add(history_, "kinetic_energy", "J/m", motion.kinetic_energy);
     add(history_, "strain_energy", "J/m", state.strain_energy);
@@ -157,9 +144,27 @@ void Observer::sample(double t)
     add(history_, "angular_momentum", "kg m/s", motion.angular_momentum);
     add(history_, "unbalanced_force", "-", motion.unbalanced);
     add(history_, "max_stress", "Pa", state.max_stress);
+    write_ledger(last_);
     sample_restraints();
     if (!probes_.empty())
         sample_probes(t);
+    return last_;
+}
+
+void Observer::write_ledger(const GuardSample& s)
+{
+    add(history_, "kinetic_energy_points", "J/m", s.point_motion.kinetic_energy);
+    add(history_, "volume_ratio_min", "-", s.points.smallest);
+    add(history_, "volume_ratio_max", "-", s.points.largest);
+    add(history_, "points_outside", "-", s.points.outside);
+    add(history_, "courant_motion", "-", s.point_motion.speed * s.dt / lattice_.cell_size);
+    if (!solver_.nodes().second)
+        return;
+    add(history_, "external_work", "J/m", s.energy.external);
+    add(history_, "plastic_dissipation", "J/m", s.energy.plastic);
+    add(history_, "damping_dissipation", "J/m", s.energy.damping);
+    add(history_, "hourglass_dissipation", "J/m", s.energy.hourglass);
+    add(history_, "numerical_energy", "J/m", s.energy.numerical);
 }
 
 void Observer::add(std::vector<Series>& list, const std::string& name, const char* unit, std::span<const double> row)
@@ -215,8 +220,8 @@ void Observer::sample_probes(double t)
 
 double Observer::kinetic_ratio(const Solver& solver)
 {
-    const double strain = point_sums(solver.bodies()).strain_energy;
-    return strain > 0 ? solver.sums().kinetic_energy / strain : std::numeric_limits<double>::infinity();
+    const double strain = strain_energy(solver.bodies());
+    return strain > 0 ? solver.sums().kinetic_before / strain : std::numeric_limits<double>::infinity();
 }
 
 void Observer::snapshot(ResultFile& file, double t, std::int64_t step)

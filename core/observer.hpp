@@ -1,7 +1,9 @@
 #pragma once
 /// What is recorded of a run: the history of sums and probes, and snapshots of all points in the order of their ids.
 
+#include "core/guards.hpp"
 #include "core/node_ops.hpp"
+#include "core/plastic_work.hpp"
 #include "core/results.hpp"
 #include "core/solver.hpp"
 
@@ -17,13 +19,16 @@ public:
     /// @throws SceneError when a probe has no points
     Observer(const Scene& scene, const Solver& solver);
 
-    /// Adds one sample to the history. @throws Diverged for a value that is not finite
-    void sample(double t);
-    /// Kinetic over strain energy at the last sample's state.
+    /// Adds one sample to the history, and returns it. @param dt of the coming step [s]
+    /// @param fresh whether the velocities of the points are looked at anew: that costs about a step
+    /// @throws Diverged for a value that is not finite
+    const GuardSample& sample(double t, double dt, bool fresh = true);
+    /// Kinetic energy at the half step before over strain energy.
     static double kinetic_ratio(const Solver& solver);
     void snapshot(ResultFile& file, double t, std::int64_t step);
     void write_history(ResultFile& file) const;
 
+    double guard_seconds() const { return guard_seconds_; }  ///< spent on what the guards alone need
     std::size_t snapshots() const { return snapshot_times_.size(); }
     /// The file that shows the snapshots in ParaView. @param name of the HDF5 file, without folder
     std::string xdmf(const std::string& name) const;
@@ -56,6 +61,9 @@ private:
     std::array<double, 6> stress(const Location& at) const;
     std::array<double, 6> exact_stress(const Place& at) const;
     std::array<double, 3> exact_displacement(const Place& at) const;
+    /// The work of gravity on the points up to time t [J/m].
+    double gravity_work(double t, const Vec2& moment);
+    void write_ledger(const GuardSample& sample);
     void sample_probes(double t);
     void sample_restraints();
     /// Adds a row to the series of that name.
@@ -74,7 +82,11 @@ private:
     std::vector<Probe> probes_;
     std::vector<double> snapshot_times_;
     std::vector<std::vector<std::pair<std::string, std::size_t>>> snapshot_fields_;  ///< of each snapshot, with their columns
-    double gravity_work_ = 0, last_time_ = 0;
+    Lattice lattice_;
+    Ledger ledger_;
+    PlasticWork plastic_;
+    GuardSample last_;
+    double gravity_work_ = 0, last_time_ = 0, guard_seconds_ = 0;
     Vec2 last_moment_;
 };
 }  // namespace testbed

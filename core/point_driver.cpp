@@ -10,6 +10,8 @@ namespace testbed
 {
 namespace
 {
+constexpr int most_steps = 1000000;  // a line of the answer each
+
 struct PointState
 {
     SymTensor<> stress;
@@ -101,6 +103,8 @@ std::string drive(const Law& law, const PointPathSpec& spec, const std::string& 
             const SymTensor<> after = point.now().stress;
             work += 0.5 * ((before.xx + after.xx) * d.xx + (before.yy + after.yy) * d.yy + (before.xy + after.xy) * d.shear());
             total = total + d;
+            if (!std::isfinite(after.xx + after.yy + after.xy + point.now().stress_zz + work))
+                throw SceneError(fmt::format("{}: segment[{}], step {}: the stress is not finite", path, number, k));
             ++step;
             write();
         }
@@ -131,6 +135,11 @@ void check_path(const PointPathSpec& spec, Problems& problems)
         problems.add("initial_stress", "four numbers are asked: xx, yy, zz, xy");
     if (spec.segments.empty())
         problems.add("segment", "no [[segment]] in the file");
+    double steps = 0;
+    for (const SegmentSpec& segment : spec.segments)
+        steps += segment.steps;
+    if (steps > most_steps)
+        problems.add("segment", fmt::format("{:.0f} steps in all are more than {}", steps, most_steps));
     for (std::size_t k = 0; k < spec.segments.size(); ++k)
     {
         if (spec.segments[k].gradient.size() != 4)
@@ -147,18 +156,28 @@ void check_path(const PointPathSpec& spec, Problems& problems)
 
 std::string drive_point(const std::string& path)
 {
+    return drive_point(read_point_path(read_text(path), path), path);
+}
+
+PointPathSpec read_point_path(const std::string& text, const std::string& path)
+{
     Problems problems(path);
     PointPathSpec spec;
     Constants constants;
     {
-        const toml::table root = parse_toml(path);
+        const toml::table root = parse_toml(text, path);
         Reader reader(root, "", problems, constants);
         spec.describe(reader);
     }
     if (problems.errors().empty())
         check_path(spec, problems);
     if (!problems.errors().empty())
-        throw SceneError(fmt::format("{}", fmt::join(problems.errors(), "\n")));
+        throw SceneError(problems.text());
+    return spec;
+}
+
+std::string drive_point(const PointPathSpec& spec, const std::string& path)
+{
     const MaterialSpec& m = spec.material;
     const ElasticModuli moduli(evaluate_constant(m.youngs_modulus, {}), m.poissons_ratio);
     const Strength<> strength =

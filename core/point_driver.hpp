@@ -44,4 +44,8 @@ struct PointPathSpec
 /// The stress path of a path file as CSV: step, strains, stresses, plastic shear strain, work per volume.
 /// @throws SceneError with file, line and key of what is wrong
 std::string drive_point(const std::string& path);
+/// The same from a path file that was read. @param path what messages call it
+std::string drive_point(const PointPathSpec& spec, const std::string& path);
+/// The text of a path file, checked. @throws SceneError
+PointPathSpec read_point_path(const std::string& text, const std::string& path);
 }  // namespace testbed

@@ -41,6 +41,12 @@ struct Points
     /// Volume of point p; a point with a box needs no volume of its own.
     double current_volume(std::size_t p) const { return half_x.active() ? 4 * half_x[p] * half_y[p] : volume[p]; }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for_each_field([&](auto& field) { a.field(field, count); });
+    }
+
 private:
     template <class Self, class F>
     static void visit(Self& self, F& f)

@@ -1,7 +1,6 @@
 #include "core/restraint.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 namespace testbed
@@ -10,21 +9,30 @@ namespace
 {
 constexpr std::size_t worth_a_team = 64;
 
-/// What a face gives to its two nodes to change its own velocity by dv. Without mass on both sides no soil lies at the face.
+/// The weights with which the velocity at a face follows from those of its two nodes; none where no soil lies at the face. Where one
+/// node has mass, the soil ends between the two: it lies at a face that is within its reach of that node, and moves with the node.
+std::array<double, 2> weights(const Nodes& carrier, const DrivenNodes::Pair& p)
+{
+    const bool low = carrier.mass[p.low] > 0, high = carrier.mass[p.high] > 0;
+    if (low && high)
+        return {1 - p.share, p.share};
+    return {low && p.share <= p.reach ? 1.0 : 0.0, high && 1 - p.share <= p.reach ? 1.0 : 0.0};
+}
+
+/// What a face gives to its two nodes to change its own velocity by dv.
 std::array<double, 2> impulse(const Nodes& carrier, const DrivenNodes::Pair& p, double dv)
 {
-    if (!(carrier.mass[p.low] > 0 && carrier.mass[p.high] > 0))
-        return {0, 0};
-    const double a = 1 - p.share, b = p.share;
-    const double size = dv / (a * a / carrier.mass[p.low] + b * b / carrier.mass[p.high]);
+    const auto [a, b] = weights(carrier, p);
+    const double size = a + b > 0 ? dv / (a * a * inverse_mass(carrier, p.low) + b * b * inverse_mass(carrier, p.high)) : 0;
     return {a * size, b * size};
 }
 
 /// Adds the reaction at a face to the forces f; returns it [N/m].
 double hold_face(const Nodes& carrier, const DrivenNodes::Pair& p, std::vector<double>& f)
 {
-    const double a = (1 - p.share) * f[p.low] * inverse_mass(carrier, p.low) + p.share * f[p.high] * inverse_mass(carrier, p.high);
-    const auto [low, high] = impulse(carrier, p, -a);
+    const auto [a, b] = weights(carrier, p);
+    const double acceleration = a * f[p.low] * inverse_mass(carrier, p.low) + b * f[p.high] * inverse_mass(carrier, p.high);
+    const auto [low, high] = impulse(carrier, p, -acceleration);
     f[p.low] += low;
     f[p.high] += high;
     return low + high;
@@ -51,12 +59,16 @@ void for_each_used(const std::vector<NodeIndex>& ascending, const Lattice& latti
 void DrivenNodes::find(const std::vector<Restraint>& restraints, const Lattice& lattice, const Nodes& nodes)
 {
     const auto& active = nodes.active();
-    const auto used = [&](const NodeIndex& n) -> std::optional<std::uint32_t>
+    const auto is_used = [&](std::uint32_t number) { return std::binary_search(active.begin(), active.end(), number); };
+    const auto add = [&](const FacePair& p, std::uint16_t restraint, std::uint16_t component)
     {
-        if (!lattice.has_node(n.i, n.j))
-            return std::nullopt;
-        const auto number = static_cast<std::uint32_t>(lattice.node(n.i, n.j));
-        return std::binary_search(active.begin(), active.end(), number) ? std::optional(number) : std::nullopt;
+        if (!lattice.has_node(p.low.i, p.low.j) || !lattice.has_node(p.high.i, p.high.j))
+            return;
+        const auto low = static_cast<std::uint32_t>(lattice.node(p.low.i, p.low.j));
+        const auto high = static_cast<std::uint32_t>(lattice.node(p.high.i, p.high.j));
+        const bool both = is_used(low) && is_used(high);
+        if (both || (p.reach > 0 && (is_used(low) || is_used(high))))
+            stages_.back().pairs.push_back({low, high, p.share, p.reach, restraint, component});
     };
     stages_.assign(1, {});
     for (std::size_t r = 0; r < restraints.size(); ++r)
@@ -69,8 +81,7 @@ void DrivenNodes::find(const std::vector<Restraint>& restraints, const Lattice& 
                               stages_.back().nodes.push_back({n, restraint, k});
                           });
             for (const FacePair& p : restraints[r].components[k].pairs)
-                if (const auto low = used(p.low), high = used(p.high); low && high)
-                    stages_.back().pairs.push_back({*low, *high, p.share, restraint, k});
+                add(p, restraint, k);
         }
         if (!stages_.back().pairs.empty())
             stages_.emplace_back();
@@ -85,12 +96,16 @@ void DrivenNodes::find(const std::vector<Restraint>& restraints, const Lattice& 
     }
 }
 
-void DrivenNodes::drive(const std::vector<Restraint>& restraints, const Nodes& carrier, std::vector<double>& vx,
-                        std::vector<double>& vy) const
+double DrivenNodes::drive(const std::vector<Restraint>& restraints, const Nodes& carrier, std::vector<double>& vx,
+                          std::vector<double>& vy) const
 {
     const std::array<std::vector<double>*, 2> velocity{&vx, &vy};
+    double work = 0;
     for (const Stage& stage : stages_)
     {
+        for (const Driven& d : stage.nodes)
+            if (const double own = restraints[d.restraint].components[d.component].velocity; own != 0)
+                work += carrier.mass[d.node] * (own - (*velocity[d.component])[d.node]) * own;
         parallel_for(
             stage.nodes.size(),
             [&](std::size_t n)
@@ -102,12 +117,16 @@ void DrivenNodes::drive(const std::vector<Restraint>& restraints, const Nodes& c
         for (const Pair& p : stage.pairs)
         {
             std::vector<double>& v = *velocity[p.component];
-            const double face = (1 - p.share) * v[p.low] + p.share * v[p.high];
-            const auto [low, high] = impulse(carrier, p, restraints[p.restraint].components[p.component].velocity - face);
+            const auto [a, b] = weights(carrier, p);
+            const double face = a * v[p.low] + b * v[p.high];
+            const double own = restraints[p.restraint].components[p.component].velocity;
+            const auto [low, high] = impulse(carrier, p, own - face);
             v[p.low] += low * inverse_mass(carrier, p.low);
             v[p.high] += high * inverse_mass(carrier, p.high);
+            work += (low + high) * own;
         }
     }
+    return work;
 }
 
 void DrivenNodes::react(std::vector<Restraint>& restraints, Nodes& nodes)
@@ -134,10 +153,12 @@ void DrivenNodes::react(std::vector<Restraint>& restraints, Nodes& nodes)
             restraints[p.restraint].reaction[p.component] += hold_face(nodes, p, *force[p.component]);
 }
 
-void DrivenNodes::hold_faces(Nodes& nodes) const
+double DrivenNodes::hold_faces(const std::vector<Restraint>& restraints, Nodes& nodes) const
 {
+    double power = 0;
     for (const Stage& stage : stages_)
         for (const Pair& p : stage.pairs)
-            hold_face(nodes, p, p.component == 0 ? nodes.fx : nodes.fy);
+            power += hold_face(nodes, p, p.component == 0 ? nodes.fx : nodes.fy) * restraints[p.restraint].components[p.component].velocity;
+    return power;
 }
 }  // namespace testbed

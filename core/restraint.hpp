@@ -13,6 +13,8 @@ struct FacePair
 {
     NodeIndex low, high;
     double share;  ///< of `high` in the interpolation, in (0, 1)
+    double reach =
+        0;  ///< of soil whose mass sits in the middle of its points [cells]: so far beyond the nodes with mass it still lies at the face
 };
 
 /// Restrains one component, x or y, at some nodes.
@@ -40,19 +42,20 @@ public:
     /// Notes which nodes in use the restraints take.
     void find(const std::vector<Restraint>& restraints, const Lattice& lattice, const Nodes& nodes);
 
-    /// Brings the velocities to the prescribed ones: at a pair by the impulse that the face passes on to both nodes.
-    void drive(const std::vector<Restraint>& restraints, const Nodes& carrier, std::vector<double>& vx, std::vector<double>& vy) const;
+    /// Brings the velocities to the prescribed ones: at a pair by the impulse that the face passes on to both nodes. Returns the work of
+    /// what moves, impulse times its velocity [J/m].
+    double drive(const std::vector<Restraint>& restraints, const Nodes& carrier, std::vector<double>& vx, std::vector<double>& vy) const;
 
     /// Adds the reactions to the forces, so that the prescribed velocities stay, and notes them.
     void react(std::vector<Restraint>& restraints, Nodes& nodes);
-    /// The same once more at the faces, without noting them.
-    void hold_faces(Nodes& nodes) const;
+    /// The same once more at the faces, without noting them. Returns their power [W/m].
+    double hold_faces(const std::vector<Restraint>& restraints, Nodes& nodes) const;
 
     /// A FacePair by the numbers of its nodes.
     struct Pair
     {
         std::uint32_t low, high;
-        double share;
+        double share, reach;
         std::uint16_t restraint, component;
     };
 

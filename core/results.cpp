@@ -1,5 +1,6 @@
 #include "core/results.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -9,11 +10,40 @@
 #include <hdf5.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 namespace testbed
 {
 namespace
 {
+/// The CRC-32 of the first `size` bytes of a file, by its descriptor.
+unsigned long crc_of(int file, std::uint64_t size)
+{
+    unsigned long crc = ::crc32(0, nullptr, 0);
+    std::vector<unsigned char> part(1 << 20);
+    for (std::uint64_t at = 0; at < size;)
+    {
+        const ssize_t n = ::pread(file, part.data(), std::min<std::uint64_t>(part.size(), size - at), static_cast<off_t>(at));
+        if (n <= 0)
+            throw OutputError(fmt::format("the result file cannot be read back: {}", n < 0 ? std::strerror(errno) : "it ends early"));
+        crc = ::crc32(crc, part.data(), static_cast<unsigned>(n));
+        at += static_cast<std::uint64_t>(n);
+    }
+    return crc;
+}
+
+/// Ends a file with its checksum: HDF5 lets bytes follow its own (docs/file_formats.md).
+void append_checksum(int file)
+{
+    const off_t size = ::lseek(file, 0, SEEK_END);
+    if (size < 0)
+        throw OutputError(fmt::format("the result file cannot be read back: {}", std::strerror(errno)));
+    const std::string line =
+        fmt::format("testbed-crc32 {:08x} {:016x}\n", crc_of(file, static_cast<std::uint64_t>(size)), static_cast<std::uint64_t>(size));
+    if (::write(file, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
+        throw OutputError(fmt::format("writing the result file failed: {}", std::strerror(errno)));
+}
+
 constexpr const char* failed = "writing the result file failed (disk full?); nothing was kept";
 
 /// An HDF5 handle with the function that closes it.
@@ -213,7 +243,9 @@ void write_text(const std::filesystem::path& path, const std::string& text)
 
 void ResultFile::commit()
 {
+    attribute("/", "checksum", std::string("crc32 at the end of the file"));
     impl_->close();
+    append_checksum(impl_->lock);
     if (::fsync(impl_->lock) != 0)
         throw OutputError(fmt::format("cannot write '{}': {}", impl_->part, std::strerror(errno)));
     std::error_code error;

@@ -1,8 +1,11 @@
 #include "core/run.hpp"
 
+#include "core/diagnosis.hpp"
+#include "core/guards.hpp"
 #include "core/method_limits.hpp"
 #include "core/observer.hpp"
 #include "core/provenance.hpp"
+#include "core/scene_trial.hpp"
 #include "core/step_control.hpp"
 
 #include <atomic>
@@ -58,7 +61,14 @@ struct Outcome
     std::string status = "completed", reason;
     ExitCode code = ExitCode::completed;
     std::int64_t steps = 0;
-    double solve_seconds = 0, output_seconds = 0;
+    double solve_seconds = 0, output_seconds = 0, guard_seconds = 0;
+    std::vector<Finding> findings;
+    std::string note;
+    Diagnosis diagnosis;
+    bool remedy_was_run = false;  ///< and held, if there still is one
+
+    bool completed() const { return status == "completed"; }
+    bool sound() const { return status != "diverged" && findings.empty(); }
 };
 
 /// Steps from 0 to the end; the history and the snapshots go to the observer.
@@ -69,7 +79,9 @@ Outcome step_through(const Scene& scene, Solver& solver, StepControl& clock, Obs
     const double end = scene.time.end;
     const double history_interval = scene.output.history > 0 ? scene.output.history : end / 200;
     const double snapshot_interval = scene.output.snapshots > 0 ? end / scene.output.snapshots : 2 * end;
+    Guards guards(scene, solver, clock.follows_limit() ? std::numeric_limits<double>::infinity() : clock.critical());
     double next_sample = 0, next_snapshot = 0, t = 0;
+    std::int64_t looked_at = 0;
     Progress progress(!quiet, end);
     const auto record = [&](bool last)
     {
@@ -80,7 +92,13 @@ Outcome step_through(const Scene& scene, Solver& solver, StepControl& clock, Obs
             solver.update_points();
         if (sample)
         {
-            observer.sample(t);
+            constexpr std::int64_t steps_between = 50;  // so that looking at all points costs little beside the steps
+            const bool fresh = last || out.steps == 0 || out.steps >= looked_at + steps_between;
+            looked_at = fresh ? out.steps : looked_at;
+            const GuardSample& now = observer.sample(t, clock.dt(), fresh);
+            const Stopwatch watching;
+            guards.watch(now, solver);
+            out.guard_seconds += watching.seconds();
             next_sample += history_interval;
         }
         if (snapshot)
@@ -132,6 +150,10 @@ Outcome step_through(const Scene& scene, Solver& solver, StepControl& clock, Obs
     }
     progress.clear();
     out.solve_seconds = watch.seconds() - out.output_seconds;
+    out.findings = guards.findings(out.completed());
+    out.note = guards.note();
+    if (!out.sound())
+        out.diagnosis = diagnose(scene, solver, {clock.dt(), clock.critical(), out.findings});
     return out;
 }
 
@@ -196,14 +218,61 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
     }
 }
 
-void write_performance(ResultFile& file, Solver& solver, const StepControl& clock, const Outcome& out, double setup_seconds,
-                       std::size_t points)
+std::string joined(const std::vector<Finding>& findings, const char* separator, bool sentences)
+{
+    std::vector<std::string> lines;
+    for (const Finding& f : findings)
+        lines.push_back(sentences ? f.code + ": " + f.sentence : f.code);
+    return fmt::format("{}", fmt::join(lines, separator));
+}
+
+void write_verdict(ResultFile& file, const Outcome& out)
+{
+    file.attribute("/", "status", out.status);
+    file.attribute("/", "reason", out.reason);
+    file.attribute("/", "soundness", std::string(out.sound() ? "sound" : "suspect"));
+    file.attribute("/", "suspect", joined(out.findings, "\n", true));
+    file.attribute("/", "cause", out.diagnosis.cause);
+    file.attribute("/", "remedy", out.diagnosis.remedy);
+    if (out.remedy_was_run)
+        file.attribute("/", "remedy_was_run", std::int64_t{1});
+}
+
+/// How the run ended, for the closing line: "completed, sound", "completed, suspect: energy".
+std::string ending(const Outcome& out)
+{
+    std::string text = out.status + (out.reason.empty() ? "" : ": " + out.reason);
+    if (!out.findings.empty())
+        text += ", suspect: " + joined(out.findings, ", ", false);
+    else if (out.sound())
+        text += ", sound";
+    if (!out.note.empty())
+        text += " (" + out.note + ")";
+    return text;
+}
+
+/// The findings of a run that is not sound, a line each, and what would help.
+void tell_findings(const Outcome& out)
+{
+    for (const Finding& f : out.findings)
+        fmt::print(stderr, "suspect: {}: {}\n", f.code, f.sentence);
+    if (!out.diagnosis.cause.empty())
+        fmt::print(stderr, "cause: {}{}{}\n", out.diagnosis.cause,
+                   out.diagnosis.remedy.empty() ? ""
+                   : out.remedy_was_run         ? "; holds with --set "
+                                                : "; may hold with --set ",
+                   out.diagnosis.remedy);
+}
+
+void write_performance(ResultFile& file, Solver& solver, const StepControl& clock, const Observer& observer, const Outcome& out,
+                       double setup_seconds, std::size_t points)
 {
     const std::string group = "/performance";
     const double particle_steps = static_cast<double>(points) * static_cast<double>(out.steps);
     file.attribute(group, "setup_s", setup_seconds);
     file.attribute(group, "solve_s", out.solve_seconds);
     file.attribute(group, "output_s", out.output_seconds);
+    file.attribute(group, "guards_s", out.guard_seconds + observer.guard_seconds());
     file.attribute(group, "steps", out.steps);
     file.attribute(group, "points", static_cast<std::int64_t>(points));
     file.attribute(group, "particle_steps", particle_steps);
@@ -227,6 +296,7 @@ Scene load_and_warn(const RunOptions& options)
         throw SceneError(fmt::format("{}", fmt::join(loaded.warnings, "\n")));
     for (const auto& w : loaded.warnings)
         fmt::print(stderr, "warning: {}\n", w);
+    try_expressions(loaded.scene);
     return std::move(loaded.scene);
 }
 
@@ -236,7 +306,6 @@ void warn(const RunOptions& options, const std::string& warning)
         throw SceneError(warning);
     fmt::print(stderr, "warning: {}\n", warning);
 }
-
 int guarded_main(const std::function<int()>& body)
 {
     const auto fail = [](ExitCode code, const char* message)
@@ -286,7 +355,27 @@ void check_output(const std::filesystem::path& output)
 
 }  // namespace
 
-ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
+namespace
+{
+Outcome run_once(const RunOptions& options, const MakeSolver& make_solver);
+
+/// Runs the scene with the remedy; one that does not hold is none.
+void try_remedy(const RunOptions& options, const MakeSolver& make_solver, const std::string& output, Outcome& out)
+{
+    RunOptions again = options;
+    again.overrides.push_back(out.diagnosis.remedy);
+    again.output = std::filesystem::path(output).replace_extension(".remedy.h5").string();
+    again.quiet = true;
+    again.diagnose = false;
+    const Outcome other = run_once(again, make_solver);
+    out.remedy_was_run = true;
+    if (other.completed() && other.sound())
+        return;
+    fmt::print(stderr, "{} was run and does not hold\n", out.diagnosis.remedy);
+    out.diagnosis.remedy.clear();
+}
+
+Outcome run_once(const RunOptions& options, const MakeSolver& make_solver)
 {
     const Stopwatch setup;
     set_threads(options.threads);
@@ -317,12 +406,12 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
     };
     ResultFile file = open();
     write_header(file, scene, *solver);
-    const Outcome out = step_through(scene, *solver, clock, observer, file, options.quiet);
+    Outcome out = step_through(scene, *solver, clock, observer, file, options.quiet);
+    if (options.diagnose && !out.diagnosis.remedy.empty() && !interrupted)
+        try_remedy(options, make_solver, output, out);
     observer.write_history(file);
-    write_performance(file, *solver, clock, out, setup_seconds, points);
-    file.attribute("/", "status", out.status);
-    file.attribute("/", "reason", out.reason);
-
+    write_performance(file, *solver, clock, observer, out, setup_seconds, points);
+    write_verdict(file, out);
     file.commit();
     try
     {
@@ -341,13 +430,21 @@ ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
                            100 * truncated_share(scene, *solver, m));
     if (!options.quiet)
         fmt::print(stderr,
-                   "{} {}: {}{}{}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.1f} bytes per "
+                   "{} {}: {}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.1f} bytes per "
                    "point; {}\n",
-                   scene.case_name(), variant_label(scene), out.status, out.reason.empty() ? "" : ": ", out.reason, points, out.steps,
-                   clock.dt(), out.solve_seconds, 1e-6 * static_cast<double>(points) * static_cast<double>(out.steps) / out.solve_seconds,
+                   scene.case_name(), variant_label(scene), ending(out), points, out.steps, clock.dt(), out.solve_seconds,
+                   1e-6 * static_cast<double>(points) * static_cast<double>(out.steps) / out.solve_seconds,
                    static_cast<double>(solver->bytes()) / static_cast<double>(points), output);
     else if (out.code != ExitCode::completed)
         fmt::print(stderr, "{}: {}\n", out.status, out.reason);
-    return out.code;
+    tell_findings(out);
+    return out;
+}
+}  // namespace
+
+ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver)
+{
+    const Outcome out = run_once(options, make_solver);
+    return options.strict && out.completed() && !out.sound() ? ExitCode::suspect : out.code;
 }
 }  // namespace testbed

@@ -18,6 +18,7 @@ enum class ExitCode
     diverged = 2,
     time_limit = 3,
     internal = 4,
+    suspect = 5,  ///< completed, but not sound; with RunOptions::strict only
     interrupted = 130
 };
 
@@ -27,7 +28,8 @@ struct RunOptions
     std::vector<std::string> overrides;
     int threads = 1;
     bool quiet = false;
-    bool strict = false;  ///< warnings are errors
+    bool strict = false;    ///< warnings are errors, and so is a suspect run
+    bool diagnose = false;  ///< a failed or suspect run is run once more with the remedy that was found
 };
 
 using MakeSolver = std::function<std::unique_ptr<Solver>(const Scene&)>;

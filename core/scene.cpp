@@ -2,22 +2,67 @@
 
 #include "core/scene_reader.hpp"
 
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
 namespace testbed
 {
 namespace
 {
+constexpr int deepest_key = 16;
+
+/// The line of the first key with more parts than a scene can have, 0 if there is none: the parser makes a table of each part, and tables
+/// in tables are taken down by recursion.
+int line_of_deep_key(std::string_view text)
+{
+    int line = 1, dots = 0;
+    for (std::size_t k = 0; k < text.size(); ++k)
+    {
+        const char c = text[k];
+        if (c == '"' || c == '\'')
+        {
+            const bool multiline = text.substr(k, 3) == std::string(3, c);
+            const std::string_view mark = multiline ? text.substr(k, 3) : text.substr(k, 1);
+            for (k += mark.size(); k < text.size() && text.substr(k, mark.size()) != mark && (multiline || text[k] != '\n'); ++k)
+            {
+                line += text[k] == '\n';
+                k += c == '"' && text[k] == '\\';
+            }
+            if (k < text.size() && text[k] == '\n')
+                --k;
+            else
+                k += mark.size() - 1;
+        }
+        else if (c == '#')
+            while (k + 1 < text.size() && text[k + 1] != '\n')
+                ++k;
+        else if (c == '.')
+        {
+            if (++dots > deepest_key)
+                return line;
+        }
+        else if (std::string_view("\n=,[]{}").find(c) != std::string_view::npos)
+            dots = 0;
+        line += k < text.size() && text[k] == '\n';
+    }
+    return 0;
+}
+
 void set_override(toml::table& root, const std::string& assignment, Problems& problems)
 {
     const auto equals = assignment.find('=');
     if (equals == std::string::npos || equals == 0)
         return problems.add("--set " + assignment, "write --set key.path=value");
     const std::string path = assignment.substr(0, equals), text = assignment.substr(equals + 1);
+    if (std::count(path.begin(), path.end(), '.') > deepest_key)
+        return problems.add("--set " + path, fmt::format("a key of more than {} parts", deepest_key));
     toml::table value;
     try
     {
-        value = toml::parse("v = " + text);
+        value = parse_toml("v = " + text, "--set");
     }
-    catch (const toml::parse_error&)
+    catch (const SceneError&)
     {
         value.insert_or_assign("v", text);  // a bare word is a string
     }
@@ -61,18 +106,37 @@ void set_override(toml::table& root, const std::string& assignment, Problems& pr
 }
 }  // namespace
 
-toml::table parse_toml(const std::string& path)
+std::string read_text(const std::string& path)
 {
+    constexpr std::size_t largest = 16 << 20;
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored))
+        throw SceneError(fmt::format("{}: is a folder, not a file", path));
+    std::ifstream file(path, std::ios::binary);
+    if (!file)
+        throw SceneError(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
+    std::string text;
+    for (std::array<char, 65536> part; text.size() <= largest && (file.read(part.data(), part.size()), file.gcount() > 0);)
+        text.append(part.data(), static_cast<std::size_t>(file.gcount()));
+    if (file.bad())
+        throw SceneError(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
+    if (text.size() > largest)
+        throw SceneError(fmt::format("{}: is larger than 16 MB: no scene", path));
+    return text;
+}
+
+toml::table parse_toml(const std::string& text, const std::string& path)
+{
+    if (const int line = line_of_deep_key(text); line > 0)
+        throw SceneError(fmt::format("{}:{}: a key of more than {} parts", path, line, deepest_key));
     try
     {
-        return toml::parse_file(path);
+        return toml::parse(text, path);
     }
     catch (const toml::parse_error& e)
     {
         const auto at = e.source().begin;
-        if (at.line == 0)
-            throw SceneError(fmt::format("{}: {}", path, e.description()));
-        throw SceneError(fmt::format("{}:{}:{}: not TOML: {}", path, at.line, at.column, e.description()));
+        throw SceneError(fmt::format("{}:{}:{}: not TOML: {}", path, at.line, at.column, shown(e.description(), 500)));
     }
 }
 
@@ -114,6 +178,8 @@ std::optional<std::string> nearest(const std::string& word, const std::vector<st
         return row[b.size()];
     };
     std::optional<std::string> best;
+    if (word.size() > 100)
+        return best;
     std::size_t least = std::max<std::size_t>(2, word.size() / 3) + 1;
     for (const auto& c : candidates)
         if (const std::size_t d = distance(word, c); d < least)
@@ -126,13 +192,19 @@ std::optional<std::string> nearest(const std::string& word, const std::vector<st
 
 LoadedScene load_scene(const std::string& path, const std::string& method, const std::vector<std::string>& overrides)
 {
+    return load_scene_text(read_text(path), path, method, overrides);
+}
+
+LoadedScene load_scene_text(const std::string& text, const std::string& path, const std::string& method,
+                            const std::vector<std::string>& overrides, const SceneBounds& bounds)
+{
     Problems problems(path);
     const auto throw_if_any = [&]
     {
         if (!problems.errors().empty())
-            throw SceneError(fmt::format("{}", fmt::join(problems.errors(), "\n")));
+            throw SceneError(problems.text());
     };
-    toml::table root = parse_toml(path);
+    toml::table root = parse_toml(text, path);
     for (const auto& assignment : overrides)
         set_override(root, assignment, problems);
     if (!method.empty())
@@ -162,7 +234,9 @@ LoadedScene load_scene(const std::string& path, const std::string& method, const
         scene.describe(reader);
     }
     throw_if_any();
-    check_scene(scene, problems);
+    check_scene(scene, bounds, problems);
+    throw_if_any();
+    check_bounds(scene, problems);
     throw_if_any();
     for (BodySpec& body : scene.bodies)
         if (!body.inside.empty())
@@ -182,21 +256,13 @@ const std::vector<Variant>& variants()
          }},
         {"lpfdm", "lpfdm", "each point has a domain, central convection, hourglass control", [](Scene& s) { s.lpfdm = LpfdmSpec{}; }},
         {"mpm-linear", "mpm", "linear shape functions, strain at each point, FLIP, MUSL",
-         [](Scene& s) {
-             s.mpm = {"linear", "musl", "four_point", 1.0};
-         }},
+         [](Scene& s) { s.mpm = {.shape = "linear", .scheme = "musl", .strain = "four_point"}; }},
         {"mpm-linear-bbar", "mpm", "linear shape functions, volumetric strain averaged over each cell, FLIP, MUSL",
-         [](Scene& s) {
-             s.mpm = {"linear", "musl", "b_bar", 1.0};
-         }},
+         [](Scene& s) { s.mpm = {.shape = "linear", .scheme = "musl", .strain = "b_bar"}; }},
         {"mpm-bspline", "mpm", "quadratic B-splines, linear at the edges of the lattice; FLIP, MUSL",
-         [](Scene& s) {
-             s.mpm = {"bspline", "musl", "four_point", 1.0};
-         }},
+         [](Scene& s) { s.mpm = {.shape = "bspline", .scheme = "musl", .strain = "four_point"}; }},
         {"mpm-cpgimp", "mpm", "contiguous-particle GIMP: each point's box stretches with it; FLIP, MUSL",
-         [](Scene& s) {
-             s.mpm = {"cpgimp", "musl", "four_point", 1.0};
-         }},
+         [](Scene& s) { s.mpm = {.shape = "cpgimp", .scheme = "musl", .strain = "four_point"}; }},
         {"fem-q1", "fem", "small-strain reference, bilinear elements", [](Scene& s) { s.fem.degree = 1; }},
         {"fem-q2", "fem", "small-strain reference, biquadratic elements", [](Scene& s) { s.fem.degree = 2; }},
     };

@@ -102,8 +102,8 @@ struct BodySpec
         v.optional("radius", radius, "m", "disk");
         v.optional("vertices", vertices, "m", "polygon: corners in order");
         v.optional("inside", inside, "", "an inclusion: takes those points of this other body that lie in its shape, and their size");
-        v.optional("velocity", velocity, "m/s", "initial velocity, two expressions of X, Y");
-        v.optional("initial_stress", initial_stress, "Pa", "four expressions of X, Y: xx, yy, zz, xy; such as K0 stress under gravity");
+        v.expression("velocity", velocity, "X, Y", "m/s", "initial velocity, two expressions");
+        v.expression("initial_stress", initial_stress, "X, Y", "Pa", "four expressions: xx, yy, zz, xy; such as K0 stress under gravity");
     }
 };
 
@@ -115,7 +115,7 @@ struct BoundarySpec
     void describe(V& v)
     {
         v.required("name", name, "", "name of the boundary");
-        v.expression("where", where, "", "condition on node positions x, y, such as \"y <= 0\"");
+        v.expression("where", where, "x, y", "", "condition on the positions of nodes, such as \"y <= 0\"");
         v.choice("fix", fix, {"x", "y", "xy"}, "velocity components held at zero; one component makes a roller");
     }
 };
@@ -133,14 +133,14 @@ struct WallSpec
     void describe(V& v)
     {
         v.required("name", name, "", "name of the wall; its reaction and displacement go into the history");
-        v.required("min", min, "m", "lower left corner at the start");
+        v.required("min", min, "m", "lower left corner at the start; half a cell of soil beside a wall moves with it, see docs/methods.md");
         v.required("max", max, "m", "upper right corner; equal to min in one coordinate makes a plate");
-        v.optional("velocity", velocity, "m/s", "two expressions of t; absent: an obstacle");
+        v.expression("velocity", velocity, "t", "m/s", "two expressions; absent: an obstacle");
         v.choice("fix", fix, {"x", "y", "xy"}, "velocity components that soil at the wall shares; xy is rough, one is smooth");
         v.choice("motion", motion, {"hand_off", "smooth"},
                  "hand_off: after each cell of travel the next line of nodes is driven, as published; smooth: the velocity interpolated "
-                 "at the wall's face is driven");
-        v.optional("door", door, "m", "an opening, from .. to along the longer side");
+                 "at the wall's face is driven; both pull soil that they leave");
+        v.optional("door", door, "m", "an opening, from .. to along the longer side; the soil half a cell within its ends is held");
         v.optional("door_opens", door_opens, "s", "time at which the door opens");
     }
 };
@@ -167,7 +167,7 @@ struct TractionSpec
         v.required("name", name, "", "name of the traction");
         v.required("body", body, "", "name of a box");
         v.choice("face", face, {"left", "right", "bottom", "top"}, "of the box; its outermost row of points carries the load");
-        v.required("traction", traction, "Pa", "two expressions of X, Y, t: force per area of the initial face");
+        v.expression("traction", traction, "X, Y, x, y, t", "Pa", "two expressions: force per area of the initial face");
     }
 };
 
@@ -178,7 +178,7 @@ struct BodyForceSpec
     template <class V>
     void describe(V& v)
     {
-        v.required("acceleration", acceleration, "m/s^2", "two expressions of X, Y, x, y, t, per unit mass");
+        v.expression("acceleration", acceleration, "X, Y, x, y, t", "m/s^2", "two expressions, per unit mass");
     }
 };
 
@@ -190,7 +190,7 @@ struct ProbeSpec
     void describe(V& v)
     {
         v.required("name", name, "", "name in the history");
-        v.expression("where", where, "", "condition on initial positions X, Y; the mean of these points is recorded");
+        v.expression("where", where, "X, Y", "", "condition on initial positions; the mean of these points is recorded");
     }
 };
 
@@ -203,8 +203,8 @@ struct ExactSpec
     template <class V>
     void describe(V& v)
     {
-        v.optional("displacement", displacement, "m", "two expressions of X, Y, t");
-        v.optional("stress", stress, "Pa", "four expressions of X, Y, t: xx, yy, zz, xy");
+        v.expression("displacement", displacement, "X, Y, x, y, t", "m", "two expressions");
+        v.expression("stress", stress, "X, Y, x, y, t", "Pa", "four expressions: xx, yy, zz, xy");
     }
 };
 
@@ -254,25 +254,38 @@ struct ReportSpec
 
 struct LpfdmSpec
 {
-    std::string support = "domain", convection = "central", frontier = "extrapolate";
-    double hourglass = 0.05;
+    std::string support = "domain", convection = "two_sided", frontier = "arrival";
+    double hourglass = 0.05, volume_cap = 0;
 
     template <class V>
     void describe(V& v)
     {
         v.choice("support", support, {"point", "domain"},
                  "point: a point belongs to one cell; domain: its box spreads over the cells that it overlaps");
-        v.choice("convection", convection, {"upwind", "central", "none"}, "form of eq. (13)");
-        v.choice("frontier", frontier, {"extrapolate", "literal"},
-                 "velocity of nodes reached for the first time: mean of neighbours, or zero");
+        v.choice(
+            "convection", convection, {"upwind", "central", "two_sided", "none"},
+            "form of eq. (13); two_sided: central, from the next layer of cells where one side has no material, half of it before and half "
+            "after the forces, strain and position at the middle of the step");
+        v.choice(
+            "frontier", frontier, {"extrapolate", "literal", "arrival"},
+            "velocity of nodes reached for the first time: mean of neighbours, or zero; arrival: whenever mass arrives at a free face, "
+            "it brings its velocity");
         v.optional("hourglass", hourglass, "-", "coefficient chi of the viscous hourglass force, at most 0.5; 0 leaves it out");
+        v.optional(
+            "volume_cap", volume_cap, "-",
+            "support = \"point\": stress counts over at most this many times a point's initial volume: one alone in its cell, grown by "
+            "tension, has more stiffness than mass; 0 sets no limit");
     }
 };
 
 struct MpmSpec
 {
-    std::string shape = "linear", scheme = "musl", strain = "four_point";
+    std::string shape = "linear", scheme = "musl", strain = "four_point", increment = "midpoint";
     double flip = 1;
+    std::string transfer = "flip";
+    int xpic_order = 2;
+    std::string null_space_filter = "none";
+    double mass_cutoff = 1e-7;
 
     template <class V>
     void describe(V& v)
@@ -280,7 +293,17 @@ struct MpmSpec
         v.choice("shape", shape, {"linear", "bspline", "cpgimp"}, "nodal shape functions as seen by the points");
         v.choice("scheme", scheme, {"usl", "usf", "musl"}, "stress update last, first, or last with remapped velocity");
         v.choice("strain", strain, {"four_point", "b_bar"}, "strain at each point, or with the cell's mean volumetric strain");
-        v.optional("flip", flip, "-", "share of FLIP in the velocity update, the rest is PIC; in [0, 1]");
+        v.choice("increment", increment, {"midpoint", "forward"},
+                 "strain over the configuration at the middle of the step, second order, or at its start, first order");
+        v.choice("transfer", transfer, {"flip", "xpic"}, "velocity update of the points: FLIP blended with PIC, or XPIC(m)");
+        v.optional("flip", flip, "-", "share of FLIP in transfer = \"flip\", the rest is PIC; in [0, 1]");
+        v.optional("xpic_order", xpic_order, "-", "m of transfer = \"xpic\": 1 is PIC; a larger one keeps more of what the nodes see");
+        v.choice("null_space_filter", null_space_filter, {"none", "cell"},
+                 "cell: takes from the velocity of a cell's points what its nodes do not see; needs shape = \"linear\"");
+        v.optional(
+            "mass_cutoff", mass_cutoff, "-",
+            "a node with less than this share of a full node's mass hands mass, momentum and force to its neighbours and takes their "
+            "mean velocity; the default is what rounding asks for, 0 is off");
     }
 };
 
@@ -386,6 +409,14 @@ struct LoadedScene
 /// @param overrides "key.path=value" strings; list entries by number from 0 or by name.
 /// @throws SceneError
 LoadedScene load_scene(const std::string& path, const std::string& method = "", const std::vector<std::string>& overrides = {});
+/// What a scene may have at most: points have numbers of 32 bits, and some 150 bytes each.
+struct SceneBounds
+{
+    double points = 1e9, cells = 2e9;
+};
+/// The same from the text of a scene. @param path what messages call it, and what names its case
+LoadedScene load_scene_text(const std::string& text, const std::string& path, const std::string& method = "",
+                            const std::vector<std::string>& overrides = {}, const SceneBounds& bounds = {});
 
 std::string resolved_toml(const Scene& scene);
 /// Documentation of all tables, or of one. @throws SceneError for an unknown table.

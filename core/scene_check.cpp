@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 namespace testbed
@@ -20,9 +21,12 @@ template <class T>
 void check_unique_names(const std::vector<T>& list, const std::string& key, Problems& problems)
 {
     std::set<std::string> seen;
+    constexpr std::size_t longest = 200;
     for (std::size_t k = 0; k < list.size(); ++k)
-        if (const std::string& name = list[k].name; name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos ||
-                                                    std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 32; }))
+        if (const std::string& name = list[k].name; name.size() > longest)
+            problems.add(fmt::format("{}[{}].name", key, k), fmt::format("a name of more than {} bytes", longest));
+        else if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos ||
+                 std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 32; }))
             problems.add(fmt::format("{}[{}].name", key, k), "a name is not empty and holds no '/' and no control characters");
         else if (!seen.insert(list[k].name).second)
             problems.add(fmt::format("{}[{}].name", key, k), fmt::format("'{}' is used twice", list[k].name));
@@ -50,7 +54,6 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
             problems.add(key + "." + name, fmt::format("missing, shape '{}' needs it", body.shape));
         return present;
     };
-    Vec2 low{0, 0}, high{0, 0};
     bool known = false;
     if (body.shape == "box")
     {
@@ -58,18 +61,13 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
         refuse(body.center.has_value(), "center");
         refuse(body.radius.has_value(), "radius");
         refuse(!body.vertices.empty(), "vertices");
-        if (has_min && has_max)
-        {
-            low = *body.min;
-            high = *body.max;
-            known = true;
-            for (std::size_t k = 0; k < 2 && grid.cell_size > 0; ++k)
-                if (high[k] <= low[k])
-                    problems.add(key + ".max", "must lie above and to the right of min");
-                else if (body.inside.empty() && !is_multiple(high[k] - low[k], grid.cell_size))
-                    problems.add(key + ".max", fmt::format("the extent {} m in {} is not a multiple of the cell size {} m",
-                                                           high[k] - low[k], "xy"[k], grid.cell_size));
-        }
+        known = has_min && has_max;
+        for (std::size_t k = 0; known && k < 2 && grid.cell_size > 0; ++k)
+            if (const double length = (*body.max)[k] - (*body.min)[k]; length <= 0)
+                problems.add(key + ".max", "must lie above and to the right of min");
+            else if (body.inside.empty() && !is_multiple(length, grid.cell_size))
+                problems.add(key + ".max",
+                             fmt::format("the extent {} m in {} is not a multiple of the cell size {} m", length, "xy"[k], grid.cell_size));
     }
     else if (body.shape == "disk")
     {
@@ -79,12 +77,7 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
         refuse(!body.vertices.empty(), "vertices");
         if (has_radius && *body.radius <= 0)
             problems.add(key + ".radius", "must be positive");
-        if (has_center && has_radius)
-        {
-            low = {(*body.center)[0] - *body.radius, (*body.center)[1] - *body.radius};
-            high = {(*body.center)[0] + *body.radius, (*body.center)[1] + *body.radius};
-            known = true;
-        }
+        known = has_center && has_radius;
     }
     else if (body.shape == "polygon")
     {
@@ -92,28 +85,39 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
         refuse(body.max.has_value(), "max");
         refuse(body.center.has_value(), "center");
         refuse(body.radius.has_value(), "radius");
-        if (body.vertices.size() < 3)
+        known = body.vertices.size() >= 3;
+        if (!known)
             problems.add(key + ".vertices", "at least three corners are asked");
-        else
-        {
-            known = true;
-            low = high = body.vertices[0];
-            for (const Vec2& v : body.vertices)
-                for (std::size_t k = 0; k < 2; ++k)
-                {
-                    low[k] = std::min(low[k], v[k]);
-                    high[k] = std::max(high[k], v[k]);
-                }
-        }
     }
+    if (!known)
+        return;
+    const auto [low, high] = extent(body);
     const double slack = 1e-9 * grid.cell_size;
-    for (std::size_t k = 0; known && k < 2; ++k)
-        if (low[k] < grid.origin[k] - slack || high[k] > grid.origin[k] + grid.size[k] + slack)
+    for (std::size_t k = 0; k < 2; ++k)
+        if (!(low[k] >= grid.origin[k] - slack && high[k] <= grid.origin[k] + grid.size[k] + slack))
         {
             problems.add(key, fmt::format("body '{}' spans {} = {} .. {} m, outside the lattice, {} .. {} m", body.name, "xy"[k], low[k],
                                           high[k], grid.origin[k], grid.origin[k] + grid.size[k]));
             break;
         }
+}
+
+/// Of the squares around the bodies, of which each holds all points that a body can have.
+void check_number_of_points(const Scene& scene, double most, Problems& problems)
+{
+    double points = 0;
+    for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+    {
+        const BodySpec& body = scene.bodies[k];
+        const auto [low, high] = extent(body);
+        const double h = spacing(body, scene.grid);
+        points += (high[0] - low[0]) / h * ((high[1] - low[1]) / h);
+        if (!(points <= most))
+            return problems.add(fmt::format("body[{}]", k),
+                                fmt::format("the bodies up to '{}' have some {:.2g} points, more than {:.0g}; make "
+                                            "grid.cell_size larger or points_per_cell smaller",
+                                            body.name, points, most));
+    }
 }
 
 /// Two bodies in one place would count their mass twice. Boxes are compared as such, other shapes by the points of either in the other.
@@ -127,17 +131,26 @@ void check_overlap(const Scene& scene, Problems& problems)
             overlap &= (*a.min)[d] < (*b.max)[d] - slack && (*b.min)[d] < (*a.max)[d] - slack;
         return overlap;
     };
+    std::map<const BodySpec*, std::vector<Vec2>> filled;  // of those that are asked for, once
     const auto has_points_in = [&](const BodySpec& a, const BodySpec& b)
     {
-        const auto points = fill(scene, a);
+        auto& points = filled[&a];
+        if (points.empty())
+            points = fill(scene, a);
         return std::any_of(points.begin(), points.end(), [&](const Vec2& p) { return contains(b, p, -slack); });
+    };
+    const auto apart = [&](const BodySpec& a, const BodySpec& b)
+    {
+        const auto [low, high] = extent(a);
+        const auto [other_low, other_high] = extent(b);
+        return low[0] > other_high[0] || low[1] > other_high[1] || other_low[0] > high[0] || other_low[1] > high[1];
     };
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
         for (std::size_t other = 0; other < k; ++other)
         {
             const BodySpec &a = scene.bodies[other], &b = scene.bodies[k];
-            if (!a.inside.empty() || !b.inside.empty())
-                continue;  // see check_inclusion()
+            if (!a.inside.empty() || !b.inside.empty() || apart(a, b))
+                continue;  // an inclusion: see check_inclusion()
             const bool boxes = a.min && a.max && b.min && b.max;
             if (boxes ? boxes_overlap(a, b) : has_points_in(a, b) || has_points_in(b, a))
                 problems.add(fmt::format("body[{}]", k),
@@ -321,11 +334,6 @@ void check_wall(const Scene& scene, const WallSpec& wall, const std::string& key
         return;
     try
     {
-        if (wall.velocity)
-            for (const std::string& text : *wall.velocity)
-                if (const std::string name = place_named_in(text, scene.expression_constants()); !name.empty())
-                    return problems.add(key + ".velocity",
-                                        fmt::format("'{}' is not known here: a wall moves as a whole, with a velocity of t", name));
         const auto path = wall_path(wall, scene.expression_constants(), scene.time.end);
         for (std::size_t n = 0; n < path.size(); ++n)
             if (const Vec2& u = path[n]; outside({wall.min[0] + u[0], wall.min[1] + u[1]}, {wall.max[0] + u[0], wall.max[1] + u[1]}))
@@ -395,7 +403,7 @@ void check_materials(const Scene& scene, Problems& problems, const std::function
     }
 }
 
-void check_scene(const Scene& scene, Problems& problems)
+void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& problems)
 {
     const GridSpec& grid = scene.grid;
     const auto positive = [&](double v, const std::string& key)
@@ -410,8 +418,8 @@ void check_scene(const Scene& scene, Problems& problems)
                                                   grid.cell_size));
         else if (grid.size[k] / grid.cell_size > 1e6)
             problems.add("grid.size", fmt::format("{} cells in {} are more than 1e6", grid.size[k] / grid.cell_size, "xy"[k]));
-    if (grid.cell_size > 0 && grid.size[0] / grid.cell_size * (grid.size[1] / grid.cell_size) > 2e9)
-        problems.add("grid.size", "the lattice has more than 2e9 cells");
+    if (grid.cell_size > 0 && grid.size[0] / grid.cell_size * (grid.size[1] / grid.cell_size) > bounds.cells)
+        problems.add("grid.size", fmt::format("the lattice has more than {:.0g} cells", bounds.cells));
     positive(scene.time.end, "time.end");
     positive(scene.time.cfl, "time.cfl");
     if (scene.time.dt)
@@ -439,10 +447,14 @@ void check_scene(const Scene& scene, Problems& problems)
         check_body(scene, scene.bodies[k], fmt::format("body[{}]", k), problems);
     check_unique_names(scene.bodies, "body", problems);
     if (problems.errors().empty())
+        check_number_of_points(scene, bounds.points, problems);
+    if (problems.errors().empty())  // shapes are whole, and lie in the lattice
+    {
         for (std::size_t k = 0; k < scene.bodies.size(); ++k)
             if (!scene.bodies[k].inside.empty())
                 check_inclusion(scene, scene.bodies[k], fmt::format("body[{}]", k), problems);
-    check_overlap(scene, problems);
+        check_overlap(scene, problems);
+    }
     check_unique_names(scene.boundaries, "boundary", problems);
     check_unique_names(scene.walls, "wall", problems);
     for (std::size_t k = 0; k < scene.walls.size(); ++k)
@@ -465,6 +477,10 @@ void check_scene(const Scene& scene, Problems& problems)
         problems.add("output.history", "must not be negative");
     if (scene.output.snapshots < 0 || scene.output.snapshots > 9999)
         problems.add("output.snapshots", "between 0 and 9999 is asked");
+    if (!(scene.lpfdm.volume_cap == 0 || scene.lpfdm.volume_cap >= 1))
+        problems.add("lpfdm.volume_cap", fmt::format("0 (no limit) or at least 1 is asked, not {}", scene.lpfdm.volume_cap));
+    else if (scene.lpfdm.volume_cap > 0 && scene.lpfdm.support != "point")
+        problems.add("lpfdm.volume_cap", "only for support = \"point\"");
     if (scene.lpfdm.hourglass < 0 || scene.lpfdm.hourglass > 0.5)
         problems.add("lpfdm.hourglass", fmt::format("must lie in [0, 0.5], beyond that it is unstable at the critical time step; not {}",
                                                     scene.lpfdm.hourglass));
@@ -472,6 +488,14 @@ void check_scene(const Scene& scene, Problems& problems)
         problems.add("mpm.flip", fmt::format("must lie in [0, 1], not {}", scene.mpm.flip));
     if (scene.mpm.strain == "b_bar" && scene.mpm.shape != "linear")
         problems.add("mpm.strain", "b_bar averages over a cell and needs shape = \"linear\"");
+    if (scene.mpm.xpic_order < 1 || scene.mpm.xpic_order > 20)
+        problems.add("mpm.xpic_order", fmt::format("must lie in [1, 20], not {}", scene.mpm.xpic_order));
+    if (scene.mpm.transfer == "xpic" && scene.mpm.flip != 1)
+        problems.add("mpm.flip", "blends FLIP with PIC; transfer = \"xpic\" has no use for it");
+    if (scene.mpm.null_space_filter != "none" && scene.mpm.shape != "linear")
+        problems.add("mpm.null_space_filter", "works cell by cell and needs shape = \"linear\"; for wider shapes take transfer = \"xpic\"");
+    if (!(scene.mpm.mass_cutoff >= 0 && scene.mpm.mass_cutoff <= 0.25))
+        problems.add("mpm.mass_cutoff", fmt::format("must lie in [0, 0.25], not {}", scene.mpm.mass_cutoff));
     if (scene.fem.degree != 1 && scene.fem.degree != 2)
         problems.add("fem.degree", fmt::format("1 or 2 is asked, not {}", scene.fem.degree));
     if (scene.fem.refinements < 0 || scene.fem.refinements > 10)

@@ -1,6 +1,7 @@
 #pragma once
 /// The reading archive of the scene's describe() functions.
 
+#include "core/geometry.hpp"
 #include "core/scene_problems.hpp"
 
 #include <algorithm>
@@ -9,8 +10,10 @@
 
 namespace testbed
 {
-/// @throws SceneError with the place where the file is not TOML
-toml::table parse_toml(const std::string& path);
+/// The text of a scene or a path file. @throws SceneError if it cannot be read, or is larger than any such file
+std::string read_text(const std::string& path);
+/// @param path what messages call the text @throws SceneError with the place where it is not TOML
+toml::table parse_toml(const std::string& text, const std::string& path);
 
 inline std::string kind_of(const toml::node& node)
 {
@@ -85,16 +88,20 @@ public:
         if ((has_default || find(key)) && std::find(choices.begin(), choices.end(), value) == choices.end())
             problems_.add(full(key), fmt::format("'{}' is not a choice", value) + suggestion(value, choices));
     }
-    void expression(const char* key, std::string& value, const char*, const char* doc)
+    /// An expression or a list of them. @param variables that they may depend on
+    template <class T>
+    void expression(const char* key, T& value, const char* variables, const char*, const char* doc)
     {
-        const toml::node* node = find(key);
-        if (!node)
-            problems_.add(full(key), fmt::format("missing ({})", doc));
+        if (const toml::node* node = find(key))
+            read_expressions(full(key), *node, value, variables);
         else
-        {
-            read_expression(full(key), *node, value);
-            evaluate_if_constant(value);
-        }
+            problems_.add(full(key), fmt::format("missing ({})", doc));
+    }
+    template <class T>
+    void expression(const char* key, std::optional<T>& value, const char* variables, const char*, const char*)
+    {
+        if (const toml::node* node = find(key))
+            read_expressions(full(key), *node, value.emplace(), variables);
     }
     void named_numbers(const char* key, Constants& values, const char*)
     {
@@ -102,6 +109,8 @@ public:
         if (!table)
             return;
         const bool defines_names = path_.empty();
+        if (table->size() > most_names)  // each expression is made with all of them
+            return problems_.add(full(key), fmt::format("{} names are more than {}", table->size(), most_names));
         for (const auto& [name, value] : *table)
             if (!is_identifier(name.str()))
             {
@@ -177,6 +186,8 @@ public:
         const toml::array* array = node->as_array();
         if (!array)
             return problems_.add(full(key), fmt::format("a list of tables is asked: write [[{}]]", key));
+        if (array->size() > most_tables)
+            return problems_.add(full(key), fmt::format("{} tables are more than {}", array->size(), most_tables));
         for (std::size_t k = 0; k < array->size(); ++k)
             read_table(fmt::format("{}[{}]", full(key), k), (*array)[k], values.emplace_back());
     }
@@ -200,6 +211,8 @@ public:
     }
 
 private:
+    static constexpr std::size_t most_names = 256, most_tables = 10000;
+
     std::string full(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
 
     const toml::node* find(const char* key)
@@ -317,24 +330,35 @@ private:
                 read(path, element, values.emplace_back());
         }
     }
+    void read_expressions(const std::string& path, const toml::node& node, std::string& value, const char* variables)
+    {
+        read_expression(path, node, value, variables);
+        evaluate_if_constant(value);
+    }
     template <std::size_t N>
-    void read(const std::string& path, const toml::node& node, std::array<std::string, N>& values)
+    void read_expressions(const std::string& path, const toml::node& node, std::array<std::string, N>& values, const char* variables)
     {
         if (const toml::array* array = array_of(path, node, N))
             for (std::size_t k = 0; k < N; ++k)
-                read_expression(path, (*array)[k], values[k]);
+                read_expression(path, (*array)[k], values[k], variables);
     }
-    void read_expression(const std::string& path, const toml::node& node, std::string& value)
+    void read_expression(const std::string& path, const toml::node& node, std::string& value, const char* variables)
     {
         if (const auto text = node.value_exact<std::string>())
             value = *text;
-        else if (const auto number = node.value<double>())
-            value = fmt::format("{}", *number);
+        else if (node.is_number())
+        {
+            double number = 0;
+            read(path, node, number);
+            value = fmt::format("{}", number);
+            return;
+        }
         else
             return problems_.add(path, "a number or an expression in quotes is asked, not a " + kind_of(node));
         try
         {
             const Expression check(value, constants_);
+            refuse_other_variables(value, constants_, variables);
         }
         catch (const ExpressionError& e)
         {
@@ -345,6 +369,8 @@ private:
     /// An expression of constants alone is a number: what it stands for then needs no field.
     void evaluate_if_constant(std::string& value) const
     {
+        if (is_number(value))
+            return;
         try
         {
             if (const double number = evaluate_constant(value, constants_); std::isfinite(number))

@@ -101,7 +101,11 @@ public:
         optional(key, value, unit, doc);
     }
     void choice(const char* key, std::string& value, const std::vector<std::string>&, const char* doc) { optional(key, value, "", doc); }
-    void expression(const char* key, std::string& value, const char* unit, const char* doc) { optional(key, value, unit, doc); }
+    template <class T>
+    void expression(const char* key, T& value, const char*, const char* unit, const char* doc)
+    {
+        optional(key, value, unit, doc);
+    }
     void named_numbers(const char* key, Constants& values, const char*)
     {
         if (values.empty())
@@ -179,7 +183,16 @@ public:
     {
         line(key, "", fmt::format("{}: {}", doc, fmt::join(choices, " | ")), value.empty() ? "required" : "default " + in_quotes(value));
     }
-    void expression(const char* key, std::string&, const char* unit, const char* doc) { line(key, unit, doc, "required"); }
+    template <class T>
+    void expression(const char* key, T&, const char* variables, const char* unit, const char* doc)
+    {
+        line(key, unit, fmt::format("{}; of {}", doc, variables), "required");
+    }
+    template <class T>
+    void expression(const char* key, std::optional<T>&, const char* variables, const char* unit, const char* doc)
+    {
+        line(key, unit, fmt::format("{}; of {}", doc, variables), "may be absent");
+    }
     void named_numbers(const char* key, Constants&, const char* doc) { heading(fmt::format("[{}]", full(key)), full(key), doc); }
     template <class T>
     void table(const char* key, T& value, const char* doc)

@@ -15,7 +15,7 @@ StepControl::StepControl(const Scene& scene, Solver& solver)
     dt_ = solver.is_static() ? end_ : scene.time.dt ? *scene.time.dt : cfl_ * critical_;
     if (!(end_ / dt_ < 1e12))
         throw SceneError(fmt::format("{}: time.end = {:.4g} s takes more than 1e12 steps of {:.4g} s", scene.path, end_, dt_));
-    total_ = static_cast<std::int64_t>(std::ceil(end_ / dt_ * (1 - 1e-12)));
+    total_ = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(end_ / dt_ * (1 - 1e-12))));
     if (!scene.time.dt)
         dt_ = end_ / static_cast<double>(total_);
     shortest_ = longest_ = dt_;

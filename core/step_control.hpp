@@ -13,6 +13,7 @@ public:
 
     double t() const { return t_; }    ///< [s]
     double dt() const { return dt_; }  ///< of the coming step [s]
+    bool follows_limit() const { return follows_limit_; }
     double shortest() const { return shortest_; }
     double longest() const { return longest_; }
     double critical() const { return critical_; }  ///< the limit at the start [s]

@@ -4,6 +4,7 @@
 /// `half_width` [cells] between the corner and the point.
 
 #include "core/body.hpp"
+#include "core/kinematics.hpp"
 #include "core/simd.hpp"
 
 namespace testbed
@@ -76,6 +77,12 @@ struct Weights
     }
 };
 
+/// The middles of a pack of boxes in their bin, and their half widths [cells]; points without a box have none.
+struct Box
+{
+    Pack x, y, hx, hy;
+};
+
 /// Maps points to the coordinates of their bin.
 struct BinFrame
 {
@@ -93,17 +100,22 @@ struct BinFrame
     }
 
     template <class Support, class Lanes>
-    TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    TESTBED_INLINE Box box(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
     {
         const Pack cx = x * Pack(scale) - Pack(x0), cy = y * Pack(scale) - Pack(y0);
         if constexpr (!Support::has_box)
-            return {cx - Pack(Support::half_width), cy - Pack(Support::half_width), Pack(0.0), Pack(0.0)};
+            return {cx, cy, Pack(0.0), Pack(0.0)};
         else
-        {
-            const Pack hx = min(lanes.load(&q.half_x[p]) * Pack(scale), Pack(0.5));
-            const Pack hy = min(lanes.load(&q.half_y[p]) * Pack(scale), Pack(0.5));
-            return {cx - hx, cy - hy, hx + hx, hy + hy};
-        }
+            return {cx, cy, min(lanes.load(&q.half_x[p]) * Pack(scale), Pack(0.5)), min(lanes.load(&q.half_y[p]) * Pack(scale), Pack(0.5))};
+    }
+    template <class Support, class Lanes>
+    TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    {
+        const Box b = box<Support>(q, p, lanes, x, y);
+        if constexpr (!Support::has_box)
+            return {b.x - Pack(Support::half_width), b.y - Pack(Support::half_width), Pack(0.0), Pack(0.0)};
+        else
+            return {b.x - b.hx, b.y - b.hy, b.hx + b.hx, b.hy + b.hy};
     }
     template <class Support, class Lanes>
     TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes) const
@@ -143,18 +155,17 @@ TESTBED_INLINE inline Pack volume(const Points& q, std::size_t p, const Lanes& l
         return lanes.load(&q.volume[p]);
 }
 
-/// Volume, or box, of a pack of points after the displacement gradient increment d.
+/// Volume, or box, of a pack of points after the strain increment d.
 template <class Support, class Lanes>
-TESTBED_INLINE inline void stretch(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d)
+TESTBED_INLINE inline void stretch(Points& q, std::size_t p, const Lanes& lanes, const StrainIncrement& increment, const Gradient<Pack>& d)
 {
-    const Pack one(1.0);
     if constexpr (Support::has_box)
     {
-        lanes.store(&q.half_x[p], lanes.load(&q.half_x[p]) * (one + d.xx));
-        lanes.store(&q.half_y[p], lanes.load(&q.half_y[p]) * (one + d.yy));
+        lanes.store(&q.half_x[p], lanes.load(&q.half_x[p]) * increment.stretch(d.xx));
+        lanes.store(&q.half_y[p], lanes.load(&q.half_y[p]) * increment.stretch(d.yy));
     }
     else
-        lanes.store(&q.volume[p], lanes.load(&q.volume[p]) * (one + d.trace()));
+        lanes.store(&q.volume[p], lanes.load(&q.volume[p]) * increment.stretch(d.trace()));
 }
 
 /// Adds Q quantities of the points of each bin, weighted, to the bin's S x S blocks.

@@ -4,15 +4,29 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <iterator>
+#include <limits>
 
 namespace testbed
 {
 namespace
 {
 constexpr double slack = 1e-6;  // cells
-}
 
-Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice) : spec_(spec), lattice_(lattice)
+/// How far soil lies beyond the nodes that its mass reaches [cells]: with boxes it lies where its mass does. Where all mass sits in
+/// the middle of a point, nodes beyond have none until a point passes the line of nodes before, half the points' distance behind a wall,
+/// and later where the soil is stretched: the whole distance is taken.
+double reach_of(const Scene& scene)
+{
+    const std::string& family = find_variant(scene.method).family;
+    const bool mass_in_the_middle = family == "mpm" ? scene.mpm.shape == "linear" : scene.lpfdm.support == "point";
+    int fewest = std::numeric_limits<int>::max();
+    for (const BodySpec& body : scene.bodies)
+        fewest = std::min(fewest, body.points_per_cell);
+    return mass_in_the_middle ? 1.0 / fewest : 0.0;
+}
+}  // namespace
+
+Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice) : spec_(spec), lattice_(lattice), reach_(reach_of(scene))
 {
     if (spec.velocity)
         velocity_.emplace(*spec.velocity, scene.expression_constants());
@@ -26,10 +40,7 @@ bool Wall::begin_step(double t, double dt, Restraint& restraint)
     if (others)
     {
         check_on_lattice(now, t);
-        take_nodes(now, restraint);
-        if (spec_.motion == "smooth")
-            take_faces(now, restraint);
-        taken_ = now;
+        take(now, restraint);
     }
     if (!velocity_)
         return others;
@@ -68,6 +79,14 @@ bool Wall::is_open_at(const Region& region, const Vec2& place) const
     const std::size_t along = door_direction(spec_);
     const double at = place[along] - (region.min[along] - spec_.min[along]), reach = slack * lattice_.cell_size;
     return at > (*spec_.door)[0] + reach && at < (*spec_.door)[1] - reach;
+}
+
+void Wall::take(const Region& region, Restraint& restraint)
+{
+    take_nodes(region, restraint);
+    if (spec_.motion == "smooth")
+        take_faces(region, restraint);
+    taken_ = region;
 }
 
 /// The nodes on and in the wall.
@@ -122,7 +141,7 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
                 Vec2 place = lattice_.node_position(low);
                 place[normal] = face;
                 if (!is_open_at(region, place))
-                    pairs.push_back({low, high, share});
+                    pairs.push_back({low, high, share, reach_});
             }
             if (is_plate)
                 break;

@@ -18,6 +18,25 @@ public:
     bool begin_step(double t, double dt, Restraint& restraint);
     void end_step(double dt);
 
+    /// @param restraint of this wall, which gets the nodes back that it had
+    template <class Archive>
+    void state(Archive& a, Restraint& restraint)
+    {
+        a.vector("travel", "m", travel_);
+        bool has_nodes = taken_.has_value();
+        Region region = taken_.value_or(Region{});
+        a.value("has_nodes", "-", has_nodes);
+        a.vector("min", "m", region.min);
+        a.vector("max", "m", region.max);
+        a.value("door_open", "-", region.door_open);
+        if constexpr (Archive::reads)
+        {
+            taken_.reset();
+            if (has_nodes)
+                take(region, restraint);
+        }
+    }
+
     /// Since the start [m].
     const Vec2& displacement() const { return travel_; }
     /// Nodes that the last begin_step() added; not those of the start.
@@ -26,18 +45,20 @@ public:
 private:
     struct Region
     {
-        Vec2 min, max;
+        Vec2 min{0, 0}, max{0, 0};
         bool door_open = false;
         bool operator==(const Region&) const = default;
     };
     Region region(double t) const;
     bool is_open_at(const Region& region, const Vec2& place) const;
+    void take(const Region& region, Restraint& restraint);
     void take_nodes(const Region& region, Restraint& restraint);
     void take_faces(const Region& region, Restraint& restraint) const;
     void check_on_lattice(const Region& region, double t) const;
 
     WallSpec spec_;
     Lattice lattice_;
+    double reach_;  ///< of the soil beyond the nodes that its mass reaches [cells]
     std::optional<VectorExpression> velocity_;
     Vec2 travel_{0, 0}, travel_rate_{0, 0};
     std::optional<Region> taken_;

@@ -399,7 +399,7 @@ MotionSums Elasticity::motion(const Vector& velocity) const
                                       return std::array<double, 4>{0.5 * p * velocity(dof), is_x(dof) ? p : 0, is_x(dof) ? 0 : p,
                                                                    is_x(dof) ? -arm[1] * p : arm[0] * p};
                                   });
-    return {s[0], {s[1], s[2]}, s[3], 0};
+    return {s[0], s[0], {s[1], s[2]}, s[3], 0};
 }
 
 /// Lanczos on M^-1/2 K M^-1/2: its largest Ritz value grows to the largest eigenvalue within few dozen products.

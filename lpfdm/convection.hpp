@@ -1,7 +1,7 @@
 #pragma once
 /// Convection correction of the nodal velocity: eq. (13), du <= du - (du . grad) du, as printed or solved.
 
-#include "lpfdm/grid.hpp"
+#include "lpfdm/free_faces.hpp"
 
 namespace testbed
 {
@@ -82,5 +82,59 @@ void convect(LpfdmGrid& grid, double dt)
             lanes.store(&grid.nodes.vx[n], corrected[0]);
             lanes.store(&grid.nodes.vy[n], corrected[1]);
         });
+}
+
+/// Velocity of a node at a free face after a share of the convection, with what arrives there.
+inline Vec2 velocity_at_face(const LpfdmGrid& grid, const FreeFaces& faces, std::uint32_t n, double dt, double share,
+                             const std::vector<double>* mass_before)
+{
+    Vec2 v{grid.nodes.vx[n], grid.nodes.vy[n]};
+    const double won = mass_before ? std::max(0.0, 1 - (*mass_before)[n] / grid.nodes.mass[n]) : 0;
+    const double sliver = std::max(0.0, 1 - grid.nodes.mass[n] / (FreeFaces::sliver * faces.full_mass));
+    if (won > 0 || sliver > 0)
+    {
+        const Vec2 arriving = faces.arriving(grid, mass_before, n, 1 / (share * dt), v, std::max(won, sliver));
+        const double part = std::max(won, sliver);
+        v = {v[0] + part * (arriving[0] - v[0]), v[1] + part * (arriving[1] - v[1])};
+    }
+    const Gradient<> g = faces.across(grid, n, share);
+    const double inverse = 1 / ((1 + g.xx) * (1 + g.yy) - g.xy * g.yx);
+    return {((1 + g.yy) * v[0] - g.xy * v[1]) * inverse, ((1 + g.xx) * v[1] - g.yx * v[0]) * inverse};
+}
+
+/// A share of the same, with the central difference inside and FreeFaces at the faces. The cells hold the gradients over dt.
+/// @param mass_before of nodes, in the step before; null: no mass arrives
+inline void convect(LpfdmGrid& grid, FreeFaces& faces, double dt, double share, const std::vector<double>* mass_before)
+{
+    const Pack courant(share * dt / grid.lattice.cell_size), one(1.0), part(share);
+    faces.keep_gradients(grid,
+                         [&](std::size_t first_cell, std::size_t n, const auto& lanes)
+                         {
+                             const Pack cx = min(one, max(-one, lanes.load(&grid.nodes.vx[n]) * courant));
+                             const Pack cy = min(one, max(-one, lanes.load(&grid.nodes.vy[n]) * courant));
+                             return part * CentralConvection::gradient(grid, first_cell, lanes, cx, cy);
+                         });
+    std::vector<Vec2> at_faces(faces.list().size());
+    parallel_for(
+        at_faces.size(), [&](std::size_t f) { at_faces[f] = velocity_at_face(grid, faces, faces.list()[f], dt, share, mass_before); }, 64);
+    grid.nodes.for_each(
+        [&](std::size_t n, const auto& lanes)
+        {
+            const Velocity v =
+                CentralConvection::correct({lanes.load(&grid.nodes.vx[n]), lanes.load(&grid.nodes.vy[n])}, faces.gradient(n, lanes));
+            lanes.store(&grid.nodes.vx[n], v[0]);
+            lanes.store(&grid.nodes.vy[n], v[1]);
+        });
+    for (std::size_t f = 0; f < at_faces.size(); ++f)
+    {
+        grid.nodes.vx[faces.list()[f]] = at_faces[f][0];
+        grid.nodes.vy[faces.list()[f]] = at_faces[f][1];
+    }
+    for (const auto n : faces.ahead())
+    {
+        const auto v = faces.around(grid, nullptr, n, 1 / (share * dt)).linear();
+        grid.nodes.vx[n] = v[0];
+        grid.nodes.vy[n] = v[1];
+    }
 }
 }  // namespace testbed

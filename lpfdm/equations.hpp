@@ -24,7 +24,10 @@ public:
     {
         const Points& q = body.points;
         const Weights<Support> weights(c);
-        const Pack v = lanes.keep(volume<Support>(q, p, lanes)), pressure(body.confinement);
+        Pack v = lanes.keep(volume<Support>(q, p, lanes));
+        if constexpr (S == 1)
+            v = min(v, Pack(body.counted_volume));
+        const Pack pressure(body.confinement);
         const Pack xx = v * (lanes.load(&q.sxx[p]) + pressure), yy = v * (lanes.load(&q.syy[p]) + pressure), xy = v * lanes.load(&q.sxy[p]);
         for (int j = 0; j < S; ++j)
             for (int i = 0; i < S; ++i)
@@ -115,16 +118,19 @@ inline void cell_gradients(LpfdmGrid& grid, double dt)
 }
 
 /// Viscous force against the pattern (+1, -1, -1, +1), which no gradient sees and no linear field contains.
-/// The pattern decays at four times the rate. @param rate chi c_p / L [1/s] @param x, y one force per cell of the lattice
-inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& x, std::vector<double>& y)
+/// The pattern decays at four times the rate. Returns the power that it takes from the motion [W/m].
+/// @param rate chi c_p / L [1/s] @param x, y one force per cell of the lattice
+inline double resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& x, std::vector<double>& y)
 {
     const auto pattern = [](const std::array<Pack, 4>& v) { return v[0] - v[1] - v[2] + v[3]; };
-    grid.for_each_cell(
+    const double power = grid.sum_over_cells(
         [&](std::size_t c, std::size_t n, const auto& lanes)
         {
             const Pack f = Pack(-0.25 * rate) * lanes.load(&grid.cells.mass[c]);
-            lanes.store(&x[c], f * pattern(grid.at_corners(grid.nodes.vx, n, lanes)));
-            lanes.store(&y[c], f * pattern(grid.at_corners(grid.nodes.vy, n, lanes)));
+            const Pack hx = pattern(grid.at_corners(grid.nodes.vx, n, lanes)), hy = pattern(grid.at_corners(grid.nodes.vy, n, lanes));
+            lanes.store(&x[c], f * hx);
+            lanes.store(&y[c], f * hy);
+            return -f * (hx * hx + hy * hy);
         });
     grid.for_each_node(
         [&](std::size_t n, std::size_t first_cell, const auto& lanes)
@@ -135,7 +141,27 @@ inline void resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>& 
             add(grid.nodes.fx, x);
             add(grid.nodes.fy, y);
         });
+    return power;
 }
+
+/// Where the middle node of a bin meets its points when a share theta of the step has passed: K on the way x + alpha y of points, which the
+/// displacement to first order about the node takes to A (x + alpha y - K), and likewise across. There the nodal velocity, whose gradient
+/// jumps at lattice lines, moves and strains them: at the start of the step the jumps would act half a step late, and an
+/// oscillation move points against their boxes, first order in dt.
+struct MidStep
+{
+    Vec2 stretch{1, 1}, slope{0, 0}, middle{1, 1};  ///< A, alpha, K in x and y
+
+    MidStep() = default;
+    /// @param g gradient of the step's displacement @param u displacement of the middle node [cells]
+    TESTBED_INLINE MidStep(double theta, const Gradient<>& g, const Vec2& u) : stretch{1 + theta * g.xx, 1 + theta * g.yy}
+    {
+        const auto inverse = [](double e) { return 1 - e * (1 - e); };  // a division for each bin would cost a twentieth of a step
+        const double x = theta * inverse(theta * g.xx), y = theta * inverse(theta * g.yy);
+        slope = {x * g.xy, y * g.yx};
+        middle = {1 + slope[0] - x * u[0], 1 + slope[1] - y * u[1]};
+    }
+};
 
 /// What is constant in a bin: the gradient of the increment averaged over a box, and the velocity of its (S+1) x (S+1) nodes, where it
 /// lies: copies would take registers that the loop over the points has no more.
@@ -146,8 +172,9 @@ struct BinMotion
     std::array<Gradient<>, S * S> coefficients;  ///< of 1, a, b and a b, with the shares a and b of a box in the next cells
     const double *vx, *vy;                       ///< of the bin's first node
     std::size_t stride;
+    MidStep mid;  ///< for points with a box; others are moved from where they are
 
-    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin)
+    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin, double theta, double dt)
         : vx(&grid.nodes.vx[grid.lattice.node(bin.i, bin.j)]),
           vy(&grid.nodes.vy[grid.lattice.node(bin.i, bin.j)]),
           stride(grid.lattice.node_stride())
@@ -159,23 +186,43 @@ struct BinMotion
             coefficients[1] = cell(1, 0) - cell(0, 0);
             coefficients[2] = cell(0, 1) - cell(0, 0);
             coefficients[3] = cell(1, 1) - cell(1, 0) - coefficients[2];
+            const double scale = dt / grid.lattice.cell_size;
+            mid = MidStep(theta, coefficients[0] + 0.5 * (coefficients[1] + coefficients[2]) + 0.25 * coefficients[3],
+                          {scale * vx[stride + 1], scale * vy[stride + 1]});
         }
     }
-    TESTBED_INLINE Gradient<Pack> gradient(const Corner& c) const
+    /// Displacement gradient and displacement of the points with these boxes over the step.
+    TESTBED_INLINE Gradient<Pack> operator()(const Box& box, double dt, Pack& x, Pack& y) const
     {
         Gradient<Pack> d = Pack(1.0) * coefficients[0];
-        if constexpr (S == 2)
+        if constexpr (S == 1)
+            displace({Pack(1.0) - box.x, box.x}, {Pack(1.0) - box.y, box.y}, dt, x, y);
+        else
         {
-            const Weights<Support> weights(c);
-            const Pack a = weights.x[1], b = weights.y[1];
+            const Pack beyond_x = box.x + Pack(mid.slope[0]) * box.y - Pack(mid.middle[0]);
+            const Pack beyond_y = box.y + Pack(mid.slope[1]) * box.x - Pack(mid.middle[1]);
+            const Pack inverse = Pack(0.5) / (box.hx * box.hy);
+            const Pack a = share(beyond_x, box.hx, inverse * box.hy), b = share(beyond_y, box.hy, inverse * box.hx);
             d = d + a * coefficients[1] + b * coefficients[2] + (a * b) * coefficients[3];
+            displace(hat(Pack(mid.stretch[0]) * beyond_x), hat(Pack(mid.stretch[1]) * beyond_y), dt, x, y);
         }
         return d;
     }
-    TESTBED_INLINE void displace(const Corner& c, double dt, Pack& x, Pack& y) const
+
+private:
+    /// Of a box in the next cell, with its middle this far beyond the line; at mid-step it may lie in either.
+    TESTBED_INLINE static Pack share(Pack beyond, Pack half, Pack inverse)
     {
-        const auto wx = hat(c.ax + Pack(0.5) * c.wx);
-        auto wy = hat(c.ay + Pack(0.5) * c.wy);
+        return min(max(beyond + half, Pack(0.0)) * inverse, Pack(1.0));
+    }
+    /// Bilinear weights of three nodes, this far beyond the middle one [cells].
+    TESTBED_INLINE static std::array<Pack, 3> hat(Pack beyond)
+    {
+        const Pack low = max(-beyond, Pack(0.0)), high = max(beyond, Pack(0.0));
+        return {low, Pack(1.0) - low - high, high};
+    }
+    TESTBED_INLINE void displace(const std::array<Pack, S + 1>& wx, std::array<Pack, S + 1> wy, double dt, Pack& x, Pack& y) const
+    {
         for (Pack& w : wy)
             w *= Pack(dt);
         for (int j = 0; j <= S; ++j)
@@ -190,24 +237,13 @@ struct BinMotion
             y += wy[j] * ry;
         }
     }
-    /// Bilinear weights of the nodes 0..S at xi in [0, S).
-    TESTBED_INLINE static std::array<Pack, S + 1> hat(Pack xi)
-    {
-        if constexpr (S == 1)
-            return {Pack(1.0) - xi, xi};
-        else
-        {
-            const Pack low = max(Pack(1.0) - xi, Pack(0.0)), high = max(xi - Pack(1.0), Pack(0.0));
-            return {low, Pack(1.0) - low - high, high};
-        }
-    }
 };
 
 /// Strain and rotation (5e), (5f), stress, volume, and position by eq. (6), for the points of one body; and, while they are at hand, the
 /// sums of its bins (`sums`, from the body's first on) for the next step. Returns whether a point left its bin: its sums are then no longer
 /// right.
 template <class Support, class Law>
-bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, double* sums)
+bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, const StrainIncrement& increment, double dt, double* sums)
 {
     Points& q = body.points;
     Bins& sorted = body.bins;
@@ -217,16 +253,14 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, double dt, d
                  [&](std::size_t b) TESTBED_FLATTEN
                  {
                      const BinFrame frame(grid.lattice, bins[b]);
-                     const BinMotion<Support> motion(grid, bins[b]);
+                     const BinMotion<Support> motion(grid, bins[b], increment.theta, dt);
                      for_each_pack(bins[b].begin, bins[b].end,
                                    [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                                    {
                                        Pack x = lanes.load(&q.x[p]), y = lanes.load(&q.y[p]);
-                                       const Corner c = frame.corner<Support>(q, p, lanes, x, y);
-                                       const Gradient<Pack> d = motion.gradient(c);
-                                       motion.displace(c, dt, x, y);
+                                       const Gradient<Pack> d = motion(frame.box<Support>(q, p, lanes, x, y), dt, x, y);
                                        law.update(q, p, lanes, d);
-                                       stretch<Support>(q, p, lanes, d);
+                                       stretch<Support>(q, p, lanes, increment, d);
                                        lanes.store(&q.x[p], x);
                                        lanes.store(&q.y[p], y);
                                    });

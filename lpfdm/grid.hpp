@@ -96,6 +96,23 @@ struct LpfdmGrid
                          for_each_pack(0, run.count, [&](std::size_t k, const auto& lanes) { kernel(run.begin + k, n + k, lanes); });
                      });
     }
+    /// The same for a kernel that returns a pack: its sum over all cells, in a fixed order.
+    template <class Kernel>
+    double sum_over_cells(Kernel&& kernel) const
+    {
+        return ordered_sum<1>(
+            cell_runs_.size(),
+            [&](std::size_t r) TESTBED_FLATTEN
+            {
+                const Run& run = cell_runs_[r];
+                const std::size_t n = first_node(run.begin);
+                Pack total(0.0);
+                for_each_pack(0, run.count,
+                              [&](std::size_t k, const auto& lanes) { total += lanes.keep(kernel(run.begin + k, n + k, lanes)); });
+                return std::array{sum(total)};
+            },
+            4)[0];
+    }
     /// kernel(n, c, lanes) for the nodes [n, n + lanes) in use, with their first cells [c, c + lanes).
     template <class Kernel>
     void for_each_node(Kernel&& kernel) const

@@ -23,9 +23,12 @@ public:
           bodies_(
               make_bodies(scene, make_lattice(scene.grid), {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
           node_ops_(scene, make_lattice(scene.grid)),
-          was_active_(grid_.lattice.nodes(), 0),
-          options_(scene.lpfdm)
+          mass_before_(grid_.lattice.nodes(), 0),
+          options_(scene.lpfdm),
+          increment_{scene.lpfdm.convection == "two_sided" ? 0.5 : 0.0}
     {
+        if (options_.convection == "two_sided")
+            faces_.emplace(grid_.lattice.nodes());
         if (scene.body_force)
             body_force_.emplace(*scene.body_force, scene.expression_constants());
         if (!scene.tractions.empty())
@@ -33,19 +36,24 @@ public:
         if (has_nonlocal_softening(scene))
             nonlocal_.emplace(scene, grid_.lattice.cell_size);
         if (scene.time.density_scaling)
-            weight_.emplace();
+            node_ops_.weigh_with(weight_.emplace().nodes);
         if (scene.damping)
             damping_ = scene.damping->local;
         for (const Body& body : bodies_)
             wave_speed_ =
                 std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
+        if (faces_)
+            faces_->full_mass = lightest_full_node();
+        if (options_.volume_cap > 0)
+            for (Body& body : bodies_)
+                body.counted_volume = options_.volume_cap * body.points.initial_volume;
         rebuild();
         set_initial_velocity(scene);
     }
 
     void do_prepare(const Step& step) override
     {
-        const auto [t, dt, last_dt] = step;
+        const double t = step.t, dt = step.dt;
         node_ops_.begin_step(t, dt);
         timer_("bins",
                [&]
@@ -66,23 +74,24 @@ public:
                {
                    extend_to_frontier();
                    convect_velocity(step.last_dt);
+                   keep_mass();
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         if (options_.hourglass > 0)
-            timer_("hourglass", [&] { resist_hourglass(grid_, hourglass_rate(), hourglass_x_, hourglass_y_); });
+            timer_("hourglass", [&] { node_ops_.note_hourglass(resist_hourglass(grid_, hourglass_rate(), hourglass_x_, hourglass_y_)); });
         internal_ = force_norm(nodes_);
         timer_("node operations (11)(15)",
                [&]
                {
                    if (body_force_)
-                       add_body_force(step.t);
+                       node_ops_.apply_load(nodes_, [&] { add_body_force(t); });
                    if (tractions_)
-                       tractions_->apply(grid_.lattice, bodies_, nodes_, step.t);
+                       node_ops_.apply_load(nodes_, [&] { tractions_->apply(grid_.lattice, bodies_, nodes_, t); });
                    if (weight_)
                        find_weight();
-                   node_ops_.apply_forces(grid_.lattice, nodes_, weight_ ? weight_->nodes : nodes_.mass, step.t);
+                   node_ops_.apply_forces(grid_.lattice, nodes_, t);
                });
-        lag_ = 0.5 * last_dt;
+        lag_ = 0.5 * step.last_dt;
     }
 
     void do_advance(const Step& step) override
@@ -91,9 +100,19 @@ public:
         timer_("acceleration (12)(14)",
                [&]
                {
-                   accelerate(nodes_, step.kick());
+                   node_ops_.kick(nodes_, step.kick());
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
+        if (faces_)
+            timer_("convection (13)",
+                   [&]
+                   {
+                       cell_gradients(grid_, dt);
+                       if (!started_)
+                           faces_->find(grid_);
+                       convect(grid_, *faces_, dt, 0.5, nullptr);
+                       node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
+                   });
         started_ = true;
         timer_("cell strain (5)",
                [&]
@@ -107,8 +126,9 @@ public:
                    std::size_t first_bin = 0;
                    for (Body& body : bodies_)
                    {
-                       moved_ |= std::visit(
-                           [&](const auto& law) { return move_points<Support>(grid_, body, law, dt, sums_.of(first_bin)); }, body.material);
+                       moved_ |= std::visit([&](const auto& law)
+                                            { return move_points<Support>(grid_, body, law, increment_, dt, sums_.of(first_bin)); },
+                                            body.material);
                        first_bin += body.bins.list().size();
                    }
                });
@@ -117,6 +137,12 @@ public:
 
     MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, lag_, internal_); }
 
+    PointMotion point_motion() const override
+    {
+        return point_motion_of(bodies_, [&](std::size_t body, std::size_t p) { return Lpfdm::velocity(body, p); });
+    }
+    std::optional<NodalWork> work() const override { return node_ops_.work(nodes_, lag_); }
+    std::pair<const Lattice*, const Nodes*> nodes() const override { return {&grid_.lattice, &nodes_}; }
     const std::vector<Body>& bodies() const override { return bodies_; }
 
     /// Bilinear, as eq. (6) moves the point.
@@ -146,11 +172,13 @@ public:
     std::size_t active_cells() const override { return grid_.gather.active().size(); }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + grid_.bytes() + was_active_.capacity() * sizeof(double) + sums_.bytes() +
+        return bytes_of(bodies_) + grid_.bytes() + mass_before_.capacity() * sizeof(double) + sums_.bytes() +
                (workspace_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity()) * sizeof(double) +
                cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) +
                (weight_ ? weight_->bytes() : 0) + cell_weight_.capacity() * sizeof(double);
     }
+    void write_state(StateWriter& writer) override { state(writer); }
+    void read_state(StateReader& reader) override { state(reader); }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
@@ -164,6 +192,64 @@ public:
 
 private:
     static constexpr int S = Support::S;
+
+    /// Mass of a node among four full cells of the lightest body [kg/m].
+    double lightest_full_node() const
+    {
+        double density = std::numeric_limits<double>::infinity();
+        for (const Body& body : bodies_)
+            density = std::min(density, body.points.mass / body.points.initial_volume);
+        return density * grid_.lattice.cell_size * grid_.lattice.cell_size;
+    }
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for (Body& body : bodies_)
+            body.state(a);
+        node_ops_.state(a);
+        a.value("started", "-", started_);
+        a.value("last_dt", "s", last_dt_);
+        Lattice lattice = grid_.lattice;
+        lattice.state(a);
+        if constexpr (Archive::reads)
+            rebuild_as_read(lattice);
+        std::vector<NodeIndex> at;
+        for (const auto n : nodes_.active())
+            at.push_back({lattice.node_i(n), lattice.node_j(n)});
+        a.group("node",
+                [&]
+                {
+                    a.column("i", "-", at, &NodeIndex::i);
+                    a.column("j", "-", at, &NodeIndex::j);
+                    a.nodal("velocity_x", "m/s", lattice, at, nodes_.vx);
+                    a.nodal("velocity_y", "m/s", lattice, at, nodes_.vy);
+                    a.nodal("mass_before", "kg/m", lattice, at, mass_before_);
+                });
+    }
+
+    /// After bodies were read: cells and nodes in use, and the sums, as they were; all nodal values are zero.
+    void rebuild_as_read(const Lattice& lattice)
+    {
+        if (lattice.numbered != grid_.lattice.numbered)
+            renumber(lattice);
+        nodes_.clear();
+        std::fill(mass_before_.begin(), mass_before_.end(), 0.0);
+        std::fill(hourglass_x_.begin(), hourglass_x_.end(), 0.0);
+        std::fill(hourglass_y_.begin(), hourglass_y_.end(), 0.0);
+        std::vector<const Bins*> bins;
+        moved_ = false;
+        for (const Body& body : bodies_)
+        {
+            bins.push_back(&body.bins);
+            moved_ |= body.bins.has_marks();
+        }
+        grid_.rebuild<S>(bins);
+        left_.clear();
+        was_rebuilt_ = true;
+        gradients_over_ = 0;
+        sums_.update(grid_.lattice, bodies_);
+    }
 
     /// Points changed their cells: sorts them and finds the cells and nodes in use.
     void rebuild()
@@ -205,8 +291,10 @@ private:
 
     void renumber(const Lattice& to)
     {
-        testbed::renumber(was_active_, grid_.lattice, to);
+        testbed::renumber(mass_before_, grid_.lattice, to);
         grid_.renumber(to);
+        if (faces_)
+            faces_->resize(to.nodes());
         if (body_force_)
             cell_force_.assign(to.cells(), {0, 0});
         if (weight_)
@@ -229,8 +317,8 @@ private:
         gradients_over_ = 0;
         std::vector<std::pair<std::uint32_t, Vec2>> reached;
         for (const auto n : nodes_.active())
-            if (nodes_.mass[n] > 0 && !was_active_[n])
-                reached.emplace_back(n, started_ && options_.frontier == "extrapolate" ? mean_of_neighbours(n) : Vec2{0, 0});
+            if (nodes_.mass[n] > 0 && !mass_before_[n])
+                reached.emplace_back(n, started_ && options_.frontier != "literal" ? mean_of_neighbours(n) : Vec2{0, 0});
         for (const auto& [n, v] : reached)
             if (started_)
             {
@@ -241,9 +329,8 @@ private:
             nodes_.mass[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
         const auto update = [&](std::uint32_t n)
         {
-            was_active_[n] = nodes_.mass[n] > 0;
-            if (!was_active_[n])
-                nodes_.vx[n] = nodes_.vy[n] = 0;
+            if (!(nodes_.mass[n] > 0))
+                mass_before_[n] = nodes_.vx[n] = nodes_.vy[n] = 0;
         };
         std::for_each(nodes_.active().begin(), nodes_.active().end(), update);
         std::for_each(left_.begin(), left_.end(), update);
@@ -257,7 +344,7 @@ private:
         nodes_.for_each(
             [&](std::size_t n, const auto& lanes)
             {
-                const Pack mass = lanes.load(&nodes_.mass[n]), was = lanes.load(&was_active_[n]);
+                const Pack mass = lanes.load(&nodes_.mass[n]), was = lanes.load(&mass_before_[n]);
                 const auto has = mass > Pack(0.0);
                 if (lanes.any(has != (was > Pack(0.0))))
                     moved.store(true, std::memory_order_relaxed);
@@ -272,6 +359,11 @@ private:
         return moved;
     }
 
+    void keep_mass()
+    {
+        nodes_.for_each([&](std::size_t n, const auto& lanes) { lanes.store(&mass_before_[n], lanes.load(&nodes_.mass[n])); });
+    }
+
     Vec2 mean_of_neighbours(std::uint32_t node) const
     {
         double mass = 0;
@@ -283,7 +375,7 @@ private:
                 if (!grid_.lattice.has_node(i + di, j + dj))
                     continue;
                 const std::size_t n = grid_.lattice.node(i + di, j + dj);
-                if (!was_active_[n])
+                if (!mass_before_[n])
                     continue;
                 mass += nodes_.mass[n];
                 momentum[0] += nodes_.mass[n] * nodes_.vx[n];
@@ -299,7 +391,12 @@ private:
             return;
         if (gradients_over_ != dt)
             cell_gradients(grid_, dt);
-        if (options_.convection == "upwind")
+        if (faces_)
+        {
+            faces_->find(grid_);
+            convect(grid_, *faces_, dt, 0.5, options_.frontier == "arrival" ? &mass_before_ : nullptr);
+        }
+        else if (options_.convection == "upwind")
             convect<UpwindConvection>(grid_, dt);
         else
             convect<CentralConvection>(grid_, dt);
@@ -355,13 +452,15 @@ private:
     Nodes& nodes_ = grid_.nodes;
     std::vector<Body> bodies_;
     NodeOps node_ops_;
-    std::vector<double> was_active_;   ///< 1 for nodes that had mass in the step before
+    std::vector<double> mass_before_;  ///< of nodes, in the step before [kg/m]
     std::vector<std::uint32_t> left_;  ///< nodes that went out of use
     LpfdmSpec options_;
+    StrainIncrement increment_;
     LpfdmSums<Support> sums_;                        ///< up to date from the end of a step on, but for bins that points left
     std::vector<double> workspace_;                  ///< the way of a field to its new order
     std::vector<double> hourglass_x_, hourglass_y_;  ///< empty unless the scene has them
     std::vector<Vec2> cell_force_;                   ///< so, too
+    std::optional<FreeFaces> faces_;                 ///< so, too
     std::optional<BodyForce> body_force_;
     std::optional<Tractions> tractions_;
     std::optional<NonlocalStrain> nonlocal_;

@@ -75,7 +75,7 @@ ElementSystem lpfdm_elements(const Lattice& lattice, const std::vector<Body>& bo
                             system.viscosity()[a * m + b] +=
                                 0.25 * hourglass_rate * w * q.mass * (pattern_x[a] * pattern_x[b] + pattern_y[a] * pattern_y[b]);
                 }
-                add_stiffness<m>(system, xx, yy, shear, law, q.current_volume(p) * stiffness_ratio(q, p));
+                add_stiffness<m>(system, xx, yy, shear, law, std::min(q.current_volume(p), body.counted_volume) * stiffness_ratio(q, p));
             }
         }
     }

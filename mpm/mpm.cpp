@@ -6,11 +6,15 @@
 #include "core/nonlocal.hpp"
 #include "core/tractions.hpp"
 #include "mpm/edges.hpp"
+#include "mpm/null_space.hpp"
+#include "mpm/small_nodes.hpp"
 #include "mpm/time_step.hpp"
-#include "mpm/transfer.hpp"
+#include "mpm/velocity_update.hpp"
+#include "mpm/xpic.hpp"
 
 #include <atomic>
 #include <cmath>
+#include <limits>
 
 namespace testbed
 {
@@ -27,8 +31,12 @@ public:
           node_ops_(scene, make_lattice(scene.grid)),
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
-          options_(scene.mpm)
+          options_(scene.mpm),
+          increment_(strain_increment(scene.mpm.increment)),
+          least_mass_(options_.mass_cutoff * mass_of_a_full_node())
     {
+        if (options_.transfer == "xpic")
+            xpic_.emplace(options_.xpic_order);
         if (scene.body_force)
             body_force_.emplace(*scene.body_force, scene.expression_constants());
         if (!scene.tractions.empty())
@@ -36,7 +44,7 @@ public:
         if (has_nonlocal_softening(scene))
             nonlocal_.emplace(scene, lattice_.cell_size);
         if (scene.time.density_scaling)
-            weight_.emplace();
+            node_ops_.weigh_with(weight_.emplace().nodes);
         if (scene.damping)
             damping_ = scene.damping->local;
         rebuild();
@@ -44,7 +52,7 @@ public:
 
     void do_prepare(const Step& step) override
     {
-        const auto [t, dt, last_dt] = step;
+        const double t = step.t, dt = step.dt;
         node_ops_.begin_step(t, dt);
         timer_("bins",
                [&]
@@ -80,25 +88,28 @@ public:
                [&]
                {
                    if (body_force_)
-                       body_force_->template apply<Shape>(lattice_, bodies_, gather_, step.t,
-                                                          [&](std::size_t n, const std::array<double, 2>& f)
-                                                          {
-                                                              nodes_.fx[n] += f[0];
-                                                              nodes_.fy[n] += f[1];
-                                                          });
-                   fold_forces();
+                       node_ops_.apply_load(nodes_, [&] { add_body_force(t); });
                    if (tractions_)
-                       tractions_->apply(lattice_, bodies_, nodes_, step.t);
+                       node_ops_.apply_load(nodes_,
+                                            [&]
+                                            {
+                                                tractions_->apply(lattice_, bodies_, nodes_, t);
+                                                fold_forces();
+                                            });
                    if (weight_)
                        find_weight();
-                   node_ops_.apply_forces(lattice_, nodes_, weight_ ? weight_->nodes : nodes_.mass, step.t);
+                   node_ops_.apply_forces(lattice_, nodes_, t);
                });
-        lag_ = 0.5 * last_dt;
+        lag_ = 0.5 * step.last_dt;
     }
 
     void do_advance(const Step& step) override
     {
         const double dt = step.dt;
+        if (xpic_)
+            timer_("xpic", [&] { filter_velocity(); });
+        if (options_.null_space_filter == "cell")
+            timer_("null-space filter", [&] { filter_points(); });
         timer_("acceleration", [&] { accelerate_and_keep_increment(step.kick()); });
         started_ = true;
         const bool remap = options_.scheme == "musl";
@@ -110,7 +121,7 @@ public:
                    {
                        keep_velocity(carrier_x_, carrier_y_);
                        to_nodes<Scatter::momentum>(workspace_);
-                       node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy);
+                       node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy, false);
                        extend(nodes_.vx, nodes_.vy);
                    });
             timer_("points, material", [&] { move_points<true>(carrier_x_, carrier_y_, dt); });
@@ -119,10 +130,32 @@ public:
             timer_("points, material", [&] { move_points<true>(nodes_.vx, nodes_.vy, dt); });
         else
             timer_("points", [&] { move_points<false>(nodes_.vx, nodes_.vy, dt); });
+        if (xpic_)
+            timer_("xpic", [&] { move_by_filter(dt); });
         node_ops_.end_step(dt);
     }
 
-    MotionSums sums() const override { return nodal_sums(lattice_, nodes_, lag_, internal_); }
+    /// The kinetic energy is that of the points: nodes see a part of it only.
+    MotionSums sums() const override
+    {
+        MotionSums s = nodal_sums(lattice_, nodes_, lag_, internal_);
+        const double points = point_motion().kinetic_energy;
+        s.kinetic_energy += points - s.kinetic_before;
+        s.kinetic_before = points;
+        return s;
+    }
+    PointMotion point_motion() const override
+    {
+        return point_motion_of(bodies_, [&](std::size_t body, std::size_t p) { return Mpm::velocity(body, p); });
+    }
+    /// With MUSL the strain is that of a velocity mapped once more, with XPIC the points move otherwise.
+    std::optional<NodalWork> work() const override
+    {
+        NodalWork work = node_ops_.work(nodes_, lag_);
+        work.of_strain = options_.scheme != "musl" && !xpic_;
+        return work;
+    }
+    std::pair<const Lattice*, const Nodes*> nodes() const override { return {&lattice_, &nodes_}; }
     const std::vector<Body>& bodies() const override { return bodies_; }
     Vec2 velocity(std::size_t body, std::size_t p) const override { return {bodies_[body].points.vx[p], bodies_[body].points.vy[p]}; }
     std::size_t unknowns() const override { return 2 * nodes_with_mass(nodes_); }
@@ -135,22 +168,28 @@ public:
     }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() + sums_.bytes() +
+        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() + small_.bytes() + sums_.bytes() +
+               (xpic_ ? xpic_->bytes() : 0) +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
                    sizeof(double) +
                (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) + (weight_ ? weight_->bytes() : 0);
     }
+    void write_state(StateWriter& writer) override { state(writer); }
+    void read_state(StateReader& reader) override { state(reader); }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
     std::vector<StepLimit> step_limits() override
     {
-        if (std::exchange(moved_, false))
+        if (moved_)
             rebuild();
         return mpm_step_limits<Shape>(lattice_, bodies_, options_, damping_);
     }
+    /// Without the filters of the velocity, which are not in this system.
     std::optional<double> sharp_step_limit() override
     {
+        if (xpic_ || options_.null_space_filter != "none" || options_.mass_cutoff > 0)
+            return std::nullopt;
         ElementSystem elements = mpm_elements<Shape, Strain>(lattice_, bodies_);
         fix(elements, node_ops_.restraints(), lattice_);
         return mpm_sharp_limit(elements, options_, damping_);
@@ -159,6 +198,37 @@ public:
 private:
     static constexpr int S = Shape::S;
     static constexpr bool reaches_beyond = std::is_same_v<Shape, BSplineShape>;  ///< the lattice's edge
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for (Body& body : bodies_)
+            body.state(a);
+        node_ops_.state(a);
+        a.value("started", "-", started_);
+        a.value("last_dt", "s", last_dt_);
+        Lattice lattice = lattice_;
+        lattice.state(a);
+        if constexpr (Archive::reads)
+            rebuild_as_read(lattice);
+    }
+
+    /// After bodies were read: nodes in use and the sums, as they were.
+    void rebuild_as_read(const Lattice& lattice)
+    {
+        if (lattice.numbered != lattice_.numbered)
+            renumber(lattice);
+        std::vector<const Bins*> bins;
+        moved_ = false;
+        for (const Body& body : bodies_)
+        {
+            bins.push_back(&body.bins);
+            moved_ |= body.bins.has_marks();
+        }
+        find_nodes(bins);
+        if (options_.scheme != "usf")
+            sums_.update(lattice_, bodies_);
+    }
 
     void rebuild()
     {
@@ -173,12 +243,7 @@ private:
         {
             if (const Lattice lattice = with_numbers_for<S>(lattice_, bins); lattice.numbered != lattice_.numbered)
                 renumber(lattice);
-            gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
-            for (const auto n : nodes_.active())  // what is left must not be taken for soil
-                nodes_.mass[n] = nodes_.vx[n] = nodes_.vy[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
-            nodes_.set_active(gather_.active());
-            if constexpr (reaches_beyond)
-                edges_.rebuild(lattice_, nodes_.active());
+            find_nodes(bins);
         }
         if (options_.scheme != "usf")
             other_bins ? sums_.update(lattice_, bodies_) : sums_.update_changed(lattice_, bodies_);
@@ -192,7 +257,7 @@ private:
         const auto take = [&](std::size_t n, double mass) { weight_->nodes[n] = mass; };
         if (options_.scheme == "usf")
         {
-            points_to_nodes<Scatter::momentum>();  // the nodes' velocity is what it was: forces have not moved a point
+            points_to_nodes<Scatter::momentum>();  // once more: the workspace holds forces now
             restrain_mapped_velocity();
             weight_->collect<sums_of<Scatter::momentum>>(bodies_, gather_, workspace_, S * S, take);
         }
@@ -200,6 +265,17 @@ private:
             weight_->collect<sums_of<Scatter::momentum_and_force>>(bodies_, gather_, sums_.all(), S * S, take);
         if constexpr (reaches_beyond)
             edges_.fold_mass(weight_->nodes);
+    }
+
+    /// The nodes that bins touch.
+    void find_nodes(const std::vector<const Bins*>& bins)
+    {
+        gather_.rebuild<S>(bins, [&](int i, int j) { return lattice_.node(i, j); });
+        for (const auto n : nodes_.active())  // what is left must not be taken for soil
+            nodes_.mass[n] = nodes_.vx[n] = nodes_.vy[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
+        nodes_.set_active(gather_.active());
+        if constexpr (reaches_beyond)
+            edges_.rebuild(lattice_, nodes_.active());
     }
 
     void renumber(const Lattice& to)
@@ -229,6 +305,7 @@ private:
     void to_nodes(const std::vector<double>& sums)
     {
         constexpr std::size_t Q = sums_of<what>;
+        std::atomic<bool> has_small{false};
         gather_.sum<Q>(sums,
                        [&](std::size_t i, const std::array<double, Q>& s)
                        {
@@ -238,7 +315,7 @@ private:
                                nodes_.vx[i] = s[1];
                                nodes_.vy[i] = s[2];
                                if constexpr (!reaches_beyond)
-                                   to_velocity(i);
+                                   to_velocity(i, has_small);
                            }
                            if constexpr (what != Scatter::momentum)
                            {
@@ -251,14 +328,53 @@ private:
             edges_.fold_mass(nodes_.mass);
             edges_.fold(nodes_.vx);
             edges_.fold(nodes_.vy);
-            parallel_for(nodes_.active().size(), [&](std::size_t a) { to_velocity(nodes_.active()[a]); });
+            parallel_for(nodes_.active().size(), [&](std::size_t a) { to_velocity(nodes_.active()[a], has_small); });
         }
+        if constexpr (what != Scatter::force)
+            take_small_nodes(has_small);
     }
-    void to_velocity(std::size_t i)
+    /// Divides the momentum by the mass, if it is more than a node needs to count.
+    void to_velocity(std::size_t i, std::atomic<bool>& has_small)
     {
-        const double inverse = inverse_mass(nodes_, i);
+        if (!(nodes_.mass[i] > least_mass_))
+            return has_small.store(true, std::memory_order_relaxed);
+        const double inverse = 1 / nodes_.mass[i];
         nodes_.vx[i] *= inverse;
         nodes_.vy[i] *= inverse;
+    }
+    void add_body_force(double t)
+    {
+        body_force_->template apply<Shape>(lattice_, bodies_, gather_, t,
+                                           [&](std::size_t n, const std::array<double, 2>& f)
+                                           {
+                                               nodes_.fx[n] += f[0];
+                                               nodes_.fy[n] += f[1];
+                                           });
+        fold_forces();
+    }
+    /// The nodes that do not count go to their neighbours; those that have none count all the same.
+    void take_small_nodes(bool has_small)
+    {
+        small_.clear();
+        if (!has_small)
+            return;
+        if (least_mass_ > 0)
+            small_.find(lattice_, nodes_, least_mass_);
+        for (const auto n : nodes_.active())
+            if (!(nodes_.mass[n] > least_mass_) && !small_.has(n))
+            {
+                const double inverse = inverse_mass(nodes_, n);
+                nodes_.vx[n] *= inverse;
+                nodes_.vy[n] *= inverse;
+            }
+        small_.fold_momentum(nodes_);
+    }
+    double mass_of_a_full_node() const
+    {
+        double least = std::numeric_limits<double>::infinity();
+        for (const Body& body : bodies_)
+            least = std::min(least, body.points.mass / body.points.initial_volume);
+        return least * lattice_.cell_size * lattice_.cell_size;
     }
     void fold_forces()
     {
@@ -267,10 +383,14 @@ private:
             edges_.fold(nodes_.fx);
             edges_.fold(nodes_.fy);
         }
+        small_.fold(nodes_.fx);
+        small_.fold(nodes_.fy);
     }
-    /// Values beyond the edge of the lattice, where the shapes reach there.
+    /// Values of nodes that do not count, and beyond the edge of the lattice, where the shapes reach there.
     void extend(std::vector<double>& x, std::vector<double>& y)
     {
+        small_.extend(x);
+        small_.extend(y);
         if constexpr (reaches_beyond)
         {
             edges_.extend(x);
@@ -304,7 +424,7 @@ private:
     /// v += F / m dt; from here on the force holds the increment of the velocity.
     void accelerate_and_keep_increment(double dt)
     {
-        accelerate(nodes_, dt);
+        node_ops_.kick(nodes_, dt);
         node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy);
         if (node_ops_.restrains())
             nodes_.for_each(
@@ -325,68 +445,159 @@ private:
         extend(nodes_.fx, nodes_.fy);
     }
 
-    /// kernel(body, law, bin, number of the bin among all, frame) for every bin of every body.
+    /// kernel(body, bin, number of the bin among all, frame) for every bin of every body.
     template <class Kernel>
     void for_each_bin(Kernel&& kernel)
     {
         std::size_t first_bin = 0;
         for (Body& body : bodies_)
         {
-            const auto& bins = body.bins.list();
+            for_each_bin_of(body, first_bin, kernel);
+            first_bin += body.bins.list().size();
+        }
+    }
+    /// The same with the law of the body: kernel(body, law, bin, number, frame).
+    template <class Kernel>
+    void for_each_bin_with_law(Kernel&& kernel)
+    {
+        std::size_t first_bin = 0;
+        for (Body& body : bodies_)
+        {
             std::visit(
-                [&](const auto& law) {
-                    parallel_for(bins.size(),
-                                 [&](std::size_t b) { kernel(body, law, bins[b], first_bin + b, BinFrame(lattice_, bins[b])); });
+                [&](const auto& law)
+                {
+                    for_each_bin_of(body, first_bin,
+                                    [&](Body& b, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_INLINE
+                                    { kernel(b, law, bin, number, frame); });
                 },
                 body.material);
-            first_bin += bins.size();
+            first_bin += body.bins.list().size();
         }
+    }
+    template <class Kernel>
+    void for_each_bin_of(Body& body, std::size_t first_bin, Kernel&& kernel)
+    {
+        const auto& bins = body.bins.list();
+        parallel_for(bins.size(), [&](std::size_t b) { kernel(body, bins[b], first_bin + b, BinFrame(lattice_, bins[b])); });
     }
 
     void update_velocity(bool remap)
     {
         if (remap)
             make_room(workspace_, gather_.blocks() * sums_of<Scatter::momentum>);
-        if (options_.flip < 1)
-            remap ? update_velocity<true, true>() : update_velocity<true, false>();
+        if (xpic_)
+            update_velocity(*xpic_, remap);
+        else if (options_.flip < 1)
+            update_velocity(BlendUpdate{options_.flip}, remap);
         else
-            remap ? update_velocity<false, true>() : update_velocity<false, false>();
+            update_velocity(FlipUpdate{}, remap);
     }
-    /// v_p = flip (v_p + sum N dv) + (1 - flip) sum N v; and the sums of the new momentum, if nodes ask for them.
-    template <bool with_pic, bool with_remap>
-    void update_velocity()
+    template <class Update>
+    void update_velocity(Update&& rule, bool remap)
+    {
+        remap ? update_velocity<true>(rule) : update_velocity<false>(rule);
+    }
+    /// The new velocity of the points; and the sums of their momentum, if nodes ask for them.
+    template <bool with_remap, class Update>
+    void update_velocity(Update& rule)
     {
         using Momentum = NodeSums<Shape, Strain, Scatter::momentum>;
-        const Pack flip(options_.flip), pic(1 - options_.flip);
         for_each_bin(
-            [&](Body& body, const auto&, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
             {
                 Points& q = body.points;
-                const NodalVelocity<S> increment(lattice_, bin, nodes_.fx, nodes_.fy), total(lattice_, bin, nodes_.vx, nodes_.vy);
+                const auto update = rule.template in_bin<S>(lattice_, nodes_, body, bin);
                 for_each_pack(bin.begin, bin.end,
                               [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                               {
                                   const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                                  const auto dv = increment.at(at);
-                                  Pack vx = lanes.load(&q.vx[p]) + dv[0], vy = lanes.load(&q.vy[p]) + dv[1];
-                                  if constexpr (with_pic)
-                                  {
-                                      const auto v = total.at(at);
-                                      vx = flip * vx + pic * v[0];
-                                      vy = flip * vy + pic * v[1];
-                                  }
-                                  lanes.store(&q.vx[p], vx);
-                                  lanes.store(&q.vy[p], vy);
+                                  update.update(q, p, lanes, at);
                               });
                 if constexpr (with_remap)
                     sum_bin<Shape, Momentum>(lattice_, body, bin, &workspace_[number * Momentum::numbers]);
             });
     }
 
+    /// What XPIC keeps of the velocity of the points, on the nodes.
+    void filter_velocity()
+    {
+        const bool driven = node_ops_.restrains();
+        make_room(workspace_, gather_.blocks() * SmoothedSums<Shape>::Q);
+        xpic_->filter(nodes_, driven ? mapped_x_ : nodes_.vx, driven ? mapped_y_ : nodes_.vy,
+                      [&](std::vector<double>& x, std::vector<double>& y) { smooth(x, y); });
+        extend(xpic_->kept_x(), xpic_->kept_y());
+        xpic_->begin_update(bodies_);
+    }
+    /// A nodal field goes to the points and back.
+    void smooth(std::vector<double>& x, std::vector<double>& y)
+    {
+        using Smoothed = SmoothedSums<Shape>;
+        extend(x, y);
+        for_each_bin(
+            [&](const Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+            {
+                Smoothed sums(lattice_, bin, x, y);
+                for_each_pack(bin.begin, bin.end,
+                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                              { sums.add(body.points, lanes, frame.template corner<Shape>(body.points, p, lanes)); });
+                sums.write(&workspace_[number * Smoothed::numbers]);
+            });
+        gather_.template sum<2>(workspace_,
+                                [&](std::size_t i, const std::array<double, 2>& s)
+                                {
+                                    x[i] = s[0];
+                                    y[i] = s[1];
+                                });
+        for (auto* values : {&x, &y})
+        {
+            if constexpr (reaches_beyond)
+                edges_.fold(*values);
+            small_.fold(*values);
+        }
+        nodes_.for_each(
+            [&](std::size_t i, const auto& lanes)
+            {
+                const Pack inverse = inverse_mass(nodes_, i, lanes);
+                lanes.store(&x[i], lanes.load(&x[i]) * inverse);
+                lanes.store(&y[i], lanes.load(&y[i]) * inverse);
+            });
+    }
+    /// What XPIC took from the velocity of the points moves them, too.
+    void move_by_filter(double dt)
+    {
+        const bool sum = options_.scheme != "usf";
+        std::atomic<bool> moved{moved_};
+        for_each_bin(
+            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+            {
+                xpic_->move(body, bin, dt);
+                if (sum ? sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number)) : any_left(body.points, bin, frame))
+                {
+                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
+                    moved.store(true, std::memory_order_relaxed);
+                }
+            });
+        moved_ = moved;
+    }
+    static bool any_left(const Points& q, const Bin& bin, const BinFrame& frame)
+    {
+        bool left = false;
+        for_each_pack(bin.begin, bin.end,
+                      [&](std::size_t p, const auto& lanes)
+                      { left |= stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes))); });
+        return left;
+    }
+    void filter_points()
+    {
+        if constexpr (std::is_same_v<Shape, LinearShape>)
+            for_each_bin([](Body& body, const Bin& bin, std::size_t, const BinFrame& frame)
+                         { filter_null_space<Shape>(frame, body.points, bin); });
+    }
+
     /// Stress alone, with the nodal velocity (USF).
     void update_stress(double dt)
     {
-        for_each_bin(
+        for_each_bin_with_law(
             [&](Body& body, const auto& law, const Bin& bin, std::size_t, const BinFrame& frame)
             {
                 Points& q = body.points;
@@ -396,7 +607,7 @@ private:
                               [&](std::size_t p, const auto& lanes)
                               {
                                   const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                                  law.update(q, p, lanes, v.template gradient<Strain>(at, strain, dt));
+                                  law.update(q, p, lanes, increment_.of(v.template gradient<Strain>(at, strain, dt)));
                               });
             });
     }
@@ -407,7 +618,7 @@ private:
     void move_points(const std::vector<double>& carrier_x, const std::vector<double>& carrier_y, double dt)
     {
         std::atomic<bool> moved{false};
-        for_each_bin(
+        for_each_bin_with_law(
             [&](Body& body, const auto& law, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
             {
                 Points& q = body.points;
@@ -418,10 +629,10 @@ private:
                               [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                               {
                                   const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                                  const Gradient<Pack> d = v.template gradient<Strain>(at, strain, dt);
+                                  const Gradient<Pack> d = increment_.of(v.template gradient<Strain>(at, strain, dt));
                                   if constexpr (with_stress)
                                       law.update(q, p, lanes, d);
-                                  stretch<Shape>(q, p, lanes, d);
+                                  stretch<Shape>(q, p, lanes, increment_, d);
                                   const auto step = carrier.at(at);
                                   const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt), y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
                                   lanes.store(&q.x[p], x);
@@ -447,9 +658,13 @@ private:
     Nodes nodes_;
     Gather gather_;
     LatticeEdges edges_;  ///< empty where shapes end at the edge
+    SmallNodes small_;    ///< empty unless a node has too little mass to count
     using Sums = NodeSums<Shape, Strain, Scatter::momentum_and_force>;
     BinSums<Shape, Sums> sums_;  ///< up to date from the end of a step on, but for bins that points left; empty if stress comes first
     MpmSpec options_;
+    StrainIncrement increment_;
+    double least_mass_;  ///< of a node that counts [kg/m]
+    std::optional<Xpic> xpic_;
     std::vector<double> workspace_;  ///< sums of the remapped momentum, and the way of a field to its new order
     std::vector<double> carrier_x_, carrier_y_;
     std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls

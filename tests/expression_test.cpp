@@ -40,6 +40,16 @@ TEST(Expression, ConstantsMustBeFinite)
     EXPECT_THROW(evaluate_constant("X", {}), ExpressionError);  // no place in a constant
 }
 
+TEST(Expression, KnowsWhatItDependsOn)
+{
+    EXPECT_TRUE(depends_on("2*x + H", {{"H", 4.0}}, "x, y"));
+    EXPECT_FALSE(depends_on("2*X + exp(t)", {}, "x, y"));
+    EXPECT_FALSE(depends_on("max(1, 2)", {}, all_variables));
+    EXPECT_NO_THROW(refuse_other_variables("x + y", {}, "x, y"));
+    EXPECT_THROW(refuse_other_variables("x + t", {}, "x, y"), ExpressionError);
+    EXPECT_THROW(Expression("y = 1", {}), ExpressionError);
+}
+
 /// A node at 3 * 0.1 = 0.30000000000000004 lies on x <= 0.3.
 TEST(Expression, HoldsNearALine)
 {

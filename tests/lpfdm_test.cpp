@@ -79,11 +79,12 @@ void check_virtual_work()
             for (const Bin& bin : body.bins.list())
             {
                 const BinFrame frame(grid.lattice, bin);
-                const BinMotion<Support> motion(grid, bin);
+                const BinMotion<Support> motion(grid, bin, 0, 0);
                 for (std::size_t p = bin.begin; p < bin.end; ++p)
                 {
-                    const Corner c = frame.corner<Support>(q, p, AllLanes{});
-                    const Gradient<Pack> d = motion.gradient(c);
+                    Pack x(0.0), y(0.0);
+                    const Gradient<Pack> d =
+                        motion(frame.box<Support>(q, p, AllLanes{}, AllLanes{}.load(&q.x[p]), AllLanes{}.load(&q.y[p])), dt, x, y);
                     const double power = q.current_volume(p) * (q.sxx[p] * d.xx[0] + q.syy[p] * d.yy[0] + q.sxy[p] * (d.xy[0] + d.yx[0]));
                     work += power;
                     scale += std::abs(power);

@@ -58,8 +58,9 @@ TEST(NodalSums, EnergyAndMomenta)
     Nodes nodes = two_nodes();
     const Lattice lattice{{0, 0}, 1.0, 1, 1};
     const MotionSums s = nodal_sums(lattice, nodes, 0.2, 5.0);
-    // v at the time of the force: 1 + 10/2*0.2 = 2, -1 + 12/4*0.2 = -0.4
-    EXPECT_NEAR(s.kinetic_energy, 0.5 * 2 * 4 + 0.5 * 4 * 0.16, 1e-12);
+    // v at the time of the force: 1 + 10/2*0.2 = 2, -1 + 12/4*0.2 = -0.4; half a step later: 3, 0.2
+    EXPECT_NEAR(s.kinetic_energy, 0.5 * 2 * (1 * 3) + 0.5 * 4 * (-1 * 0.2), 1e-12);
+    EXPECT_NEAR(s.kinetic_before, 0.5 * 2 * 1 + 0.5 * 4 * 1, 1e-12);
     EXPECT_NEAR(s.momentum[0], 4 - 1.6, 1e-12);
     EXPECT_NEAR(s.unbalanced, std::hypot(10, 12) / 5, 1e-12);
     // nodes 0 and 2 of the padded lattice stand at y = -1: L = -y m v_x

@@ -56,6 +56,28 @@ TEST(PointDriver, ConfinedCompression)
     EXPECT_GT(rows.back()[8], 0);
 }
 
+TEST(PointDriver, RefusesWhatHasNoAnswer)
+{
+    const auto told = [](const std::string& text)
+    {
+        try
+        {
+            drive_point(read_point_path(text, "path.toml"), "path.toml");
+        }
+        catch (const SceneError& e)
+        {
+            return std::string(e.what());
+        }
+        return std::string();
+    };
+    EXPECT_NE(told(law + "[[segment]]\nsteps = 1000000000\ngradient = [0, 1e-3, 0, 0]\n").find("steps in all are more than"),
+              std::string::npos);
+    std::string huge = law;
+    huge.replace(huge.find("5e7"), 3, "1e308");
+    EXPECT_NE(told(huge + "[[segment]]\nsteps = 2\ngradient = [0, 1, 0, 0]\n"), "");
+    EXPECT_EQ(told(law + "[[segment]]\nsteps = 2\ngradient = [0, 1e-3, 0, 0]\n"), "");
+}
+
 TEST(PointDriver, EveryLawAndUnloading)
 {
     for (const std::string name : {"linear_elastic", "hypoelastic_jaumann", "hypoelastic_exact_rotation"})

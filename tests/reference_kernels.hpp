@@ -244,6 +244,9 @@ struct RefMpm
     double flip = 1;
     bool b_bar = false;
     bool first = true;
+    int xpic = 0;                                                ///< order, 0 is FLIP
+    double least = 0;                                            ///< mass of a node that counts
+    std::map<Key, std::vector<std::pair<Key, double>>> given{};  ///< shares of the nodes that do not
 
     struct Node
     {
@@ -265,7 +268,83 @@ struct RefMpm
     }
     static double hat(double x) { return std::max(0.0, 1 - std::abs(x)); }
 
+    /// With the shape functions of small nodes given to their neighbours.
     std::vector<Shape> shapes(const RefPoint& p) const
+    {
+        std::vector<Shape> out;
+        for (const Shape& s : own_shapes(p))
+        {
+            const auto found = given.find(s.node);
+            if (found == given.end())
+                out.push_back(s);
+            else
+                for (const auto& [master, share] : found->second)
+                    out.push_back({master, share * s.N, share * s.gx, share * s.gy});
+        }
+        return out;
+    }
+    void find_small_nodes()
+    {
+        given.clear();
+        std::map<Key, double> mass;
+        for (const RefPoint& p : points)
+            for (const Shape& s : own_shapes(p))
+                mass[s.node] += p.m * s.N;
+        for (const auto& [k, m] : mass)
+        {
+            if (m > least)
+                continue;
+            std::vector<std::pair<Key, double>> masters;
+            double total = 0;
+            for (int dj = -1; dj <= 1; ++dj)
+                for (int di = -1; di <= 1; ++di)
+                    if (const Key other{k.first + di, k.second + dj}; mass.count(other) && mass[other] > least)
+                    {
+                        masters.push_back({other, mass[other]});
+                        total += mass[other];
+                    }
+            for (auto& [master, share] : masters)
+                share /= total;
+            if (!masters.empty())
+                given[k] = masters;
+        }
+    }
+    /// S S+ of a velocity of the points.
+    std::vector<Vec2> smoothed(const std::vector<Vec2>& v) const
+    {
+        std::map<Key, double> mass;
+        std::map<Key, Vec2> momentum;
+        for (std::size_t n = 0; n < points.size(); ++n)
+            for (const Shape& s : shapes(points[n]))
+            {
+                mass[s.node] += points[n].m * s.N;
+                for (int d = 0; d < 2; ++d)
+                    momentum[s.node][d] += points[n].m * s.N * v[n][d];
+            }
+        std::vector<Vec2> out(points.size(), Vec2{0, 0});
+        for (std::size_t n = 0; n < points.size(); ++n)
+            for (const Shape& s : shapes(points[n]))
+                for (int d = 0; d < 2; ++d)
+                    if (mass[s.node] > 0)
+                        out[n][d] += s.N * momentum[s.node][d] / mass[s.node];
+        return out;
+    }
+    /// (1 - S S+)^m of the velocity of the points: what XPIC(m) takes.
+    std::vector<Vec2> taken_by_xpic() const
+    {
+        std::vector<Vec2> v;
+        for (const RefPoint& p : points)
+            v.push_back({p.vx, p.vy});
+        for (int k = 0; k < xpic; ++k)
+        {
+            const std::vector<Vec2> u = smoothed(v);
+            for (std::size_t n = 0; n < v.size(); ++n)
+                v[n] = {v[n][0] - u[n][0], v[n][1] - u[n][1]};
+        }
+        return v;
+    }
+
+    std::vector<Shape> own_shapes(const RefPoint& p) const
     {
         std::vector<Shape> out;
         const double L = grid.L, cx = (p.x - grid.ox) / L, cy = (p.y - grid.oy) / L;
@@ -362,7 +441,10 @@ struct RefMpm
     void step(double dt, const Vec2& gravity)
     {
         std::map<Key, Node> nodes;
+        if (least > 0)
+            find_small_nodes();
         map_momentum(nodes);
+        const std::vector<Vec2> taken = xpic ? taken_by_xpic() : std::vector<Vec2>(points.size(), Vec2{0, 0});
         if (scheme == "usf" && !first)
             for (std::size_t n = 0; n < points.size(); ++n)
                 ref_stress(points[n], gradient(n, nodes, dt));
@@ -386,9 +468,10 @@ struct RefMpm
                 n.v[d] += n.dv[d];
             }
         first = false;
-        for (RefPoint& p : points)
+        for (std::size_t n = 0; n < points.size(); ++n)
         {
-            Vec2 dv{0, 0}, v{0, 0};
+            RefPoint& p = points[n];
+            Vec2 dv{-taken[n][0], -taken[n][1]}, v{0, 0};
             for (const Shape& s : shapes(p))
                 for (int d = 0; d < 2; ++d)
                 {
@@ -420,8 +503,8 @@ struct RefMpm
             p.V *= 1 + g[n].xx + g[n].yy;
             p.hx *= 1 + g[n].xx;
             p.hy *= 1 + g[n].yy;
-            p.x += move[n][0];
-            p.y += move[n][1];
+            p.x += move[n][0] - 0.5 * dt * taken[n][0];
+            p.y += move[n][1] - 0.5 * dt * taken[n][1];
         }
     }
 };

@@ -23,8 +23,8 @@ struct Fixture
     NodeOps ops;
     Nodes nodes;
 
-    explicit Fixture(const std::string& text)
-        : scene(test::load(specimen + text)),
+    explicit Fixture(const std::string& text, const std::string& method = "")
+        : scene(test::load(specimen + text, method)),
           lattice(make_lattice(scene.grid)),
           ops(scene, lattice),
           nodes(lattice.nodes())
@@ -161,6 +161,35 @@ TEST(Wall, AGapPassesNothingOn)
     f.step(0, 0.1);
     f.ops.begin_step(0.1, 0.1);  // the lower face is at y = 2.8, between a node with mass and one without
     EXPECT_EQ(f.column(3)[5], 1);
+}
+
+/// Where the mass of soil sits in the middle of its points, the nodes behind a wall that leaves it have none until a point follows. The
+/// soil within a spacing of points of the face is still pulled, by the node that has mass; with boxes their mass tells.
+TEST(Wall, PullsSoilWhoseMassDoesNotReachTheNextNode)
+{
+    for (const auto& [method, travel, follows] : {std::tuple{"lpfdm-2000", 0.1, true},
+                                                  {"lpfdm-2000", 0.2, false},
+                                                  {"mpm-linear", 0.1, true},
+                                                  {"mpm-linear-bbar", 0.1, true},
+                                                  {"lpfdm", 0.1, false},
+                                                  {"mpm-cpgimp", 0.1, false}})
+    {
+        const double speed = travel / 0.05;
+        Fixture f("[[wall]]\nname = \"cap\"\nmin = [0.0, 2.0]\nmax = [4.0, 2.0]\nvelocity = [\"0\", \"" + std::to_string(speed) +
+                      "*(t < 0.2)\"]\nmotion = \"smooth\"\nfix = \"y\"\n",
+                  method);
+        for (int j = 5; j <= f.lattice.ny; ++j)
+            for (int i = 0; i <= f.lattice.nx; ++i)
+                f.nodes.mass[f.lattice.node(i, j)] = 0;
+        f.step(0, 0.05);
+        f.ops.begin_step(0.05, 0.05);  // the face is at y = 2 + travel; points are 0.125 m apart, and the highest nodes with mass at y = 2
+        EXPECT_EQ(f.column(3)[4], follows ? speed : 1.0) << method << " " << travel;
+        const std::size_t n = f.lattice.node(3, 4);
+        f.nodes.fy[n] = -5;
+        f.ops.apply_forces(f.lattice, f.nodes, 0);
+        EXPECT_EQ(f.nodes.fy[n], follows ? 0.0 : -5.0) << method << " " << travel;
+        EXPECT_EQ(f.ops.records()[0].reaction[1], follows ? 5.0 : 0.0) << method << " " << travel;
+    }
 }
 
 /// A node of a boundary and of a wall follows the wall, and its reaction is the wall's.

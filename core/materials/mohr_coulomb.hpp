@@ -48,6 +48,7 @@ public:
     {
     }
     double tensile_strength() const { return tensile_strength_; }
+    double sin_psi() const { return sin_psi_; }
 
     /// T is double or a pack, in all templates here.
     template <class T>

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from . import metrics
+from .limits import find_limits
 from .results import Result, ResultError
 from .study_file import StudyError, matches, read_study
+from .verdicts import judge_study
 
 CSV_COLUMNS = ("run_id", "case", "method", "variant", "L", "ppc", "dt", "seed", "quantity", "norm", "value",
-               "solve_s", "particle_steps", "status")
+               "solve_s", "particle_steps", "status", "soundness", "cause", "remedy")
 PLAN = "plan.json"
 
 
@@ -27,6 +29,9 @@ class Run:
     result: Result | None = None
     rows: dict = field(default_factory=dict)
     errors: list = field(default_factory=list)
+    command: str = ""  # that makes it again
+    search: str = ""  # what is common to the runs of one bisection
+    verdict: object = None  # of a study with cases
 
     @property
     def completed(self):
@@ -35,6 +40,26 @@ class Run:
     @property
     def name(self):
         return self.values.get("variant") or self.id
+
+    @property
+    def suspect(self):
+        """Completed, and its guards say that the answer may be wrong."""
+        return self.completed and self.result is not None and self.result.soundness.startswith("suspect")
+
+    @property
+    def label(self):
+        """How it ended: the status, or 'suspect: CODE, ...'."""
+        return self.result.soundness if self.suspect else self.status
+
+    @property
+    def told(self):
+        """The reason, what the guards say, and what would help, as one text."""
+        if self.result is None:
+            return self.reason
+        parts = [self.reason, *self.result.suspect]
+        if self.result.cause:
+            parts.append(f"cause: {self.result.cause}" + (f", remedy: {self.result.remedy}" if self.result.remedy else ""))
+        return "; ".join(part for part in parts if part)
 
     def value(self, quantity, norm=""):
         """The metric, nan when the run has none."""
@@ -49,6 +74,11 @@ class Study:
     plan: dict
     runs: list
     left_out: list
+    limits: list = field(default_factory=list)  # found by searches
+
+    def case(self, name):
+        """The [[case]] of that name."""
+        return next(case for case in self.spec.cases if case.name == name)
 
     @property
     def name(self):
@@ -92,13 +122,14 @@ def read_run(folder, entry):
     for key in ("case", "method", "variant", "L", "ppc", "seed"):
         if entry.get(key) not in (None, ""):
             values[key] = entry[key]
-    run = Run(entry["id"], folder, values, "missing", entry.get("outcome", "") or "not run yet")
+    run = Run(entry["id"], folder, values, "missing", entry.get("outcome", "") or "not run yet", command=entry.get("command", ""),
+              search=entry.get("search", ""))
     path = folder / "result.h5"
     if not path.is_file():
         return run
     try:
         result = Result(path)
-        values.update(case=result.case, method=result.method, variant=result.variant, L=result.cell_size,
+        values.update(case=entry.get("case") or result.case, method=result.method, variant=result.variant, L=result.cell_size,
                       ppc=result.scene.get("points_per_cell", ""), dt=result.performance.get("dt", ""),
                       seed=result.seed)
     except ResultError as error:
@@ -110,14 +141,26 @@ def read_run(folder, entry):
     return run
 
 
+def _check_plan(path, plan):
+    """Raises StudyError when a plan is not what `testbed study` writes."""
+    lists = [plan.get(key, []) for key in ("runs", "left_out")] if isinstance(plan, dict) else [None]
+    if not all(isinstance(entries, list) and all(isinstance(e, dict) and isinstance(e.get("axes", {}), dict) for e in entries)
+               for entries in lists):
+        raise StudyError(f"{path}: is no plan of a study")
+    if not all(isinstance(entry.get("id"), str) for entry in plan.get("runs", [])):
+        raise StudyError(f"{path}: a run has no 'id'")
+
+
 def read_plan(folder):
     """plan.json of a study's folder; without one, every folder under runs/."""
     path = Path(folder) / PLAN
     if path.is_file():
         try:
-            return json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            plan = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError) as error:
             raise StudyError(f"{path}: cannot be read: {error}") from error
+        _check_plan(path, plan)
+        return plan
     runs = sorted(p.name for p in (Path(folder) / "runs").glob("*") if p.is_dir())
     return {"runs": [{"id": name} for name in runs], "left_out": []}
 
@@ -127,7 +170,11 @@ def read_study_folder(folder):
     folder = Path(folder)
     spec, plan = read_study(folder / "study.toml", need_scene=False), read_plan(folder)
     runs = [read_run(folder / "runs" / entry["id"], entry) for entry in plan.get("runs", [])]
-    return Study(folder, spec, plan, runs, plan.get("left_out", []))
+    study = Study(folder, spec, plan, runs, plan.get("left_out", []))
+    if spec.cases:
+        judge_study(study)
+        study.limits = find_limits(study)
+    return study
 
 
 def _number(value):
@@ -148,9 +195,9 @@ def metrics_csv(runs):
             continue
         performance = run.result.performance
         for (quantity, norm), value in run.rows.items():
-            writer.writerow([run.id, run.result.case, run.result.method, run.result.variant,
+            writer.writerow([run.id, run.values["case"], run.result.method, run.result.variant,
                              _number(run.values["L"]), run.values["ppc"], _number(run.values["dt"]),
                              run.values["seed"], quantity, norm, repr(float(value)),
                              _number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")),
-                             run.status])
+                             run.status, run.result.soundness, run.result.cause, run.result.remedy])
     return out.getvalue()

@@ -14,6 +14,7 @@ from .curves import curve, history
 from .drawing import (Drawing, FigureError, axis_scale, by_series, chosen, label_of, log_y, name_of, one_size, rails, short,
                       sizes_axis, snapshot_of, where_of_title, with_result, with_unit)
 from .maps import field_maps
+from .matrix import stability_matrix
 from .power_law import power_law
 from .results import ResultError
 from .style import EXACT, RAIL, WIDTH, frame, legend_below, legend_shape
@@ -303,7 +304,7 @@ def bars(study, entry, style):
 
 
 KINDS = {"convergence": convergence, "power_law": power_law, "work_precision": work_precision, "profile": profile, "field": field_maps,
-         "history": history, "curve": curve, "bars": bars}
+         "history": history, "curve": curve, "bars": bars, "stability_matrix": stability_matrix}
 
 
 def draw(study, entry, style):

@@ -199,7 +199,7 @@ def _scale_axes(axis, view, width, height):
 def field_maps(study, entry, style):
     """Panels: variants across, snapshots down; errors, where there are any, below the values."""
     notes, stripes = [], entry.get("deformed_grid", False)
-    runs = with_result(one_size(chosen(study, entry), entry), notes)
+    runs = with_result(one_size(chosen(study, entry), entry), notes, completed=not entry.get("unfinished"))
     series = [(label, run) for label, own in by_series(runs, entry, style).items() for run in own]
     wanted = entry.get("snapshot", -1)
     wanted = wanted if isinstance(wanted, list) else [wanted]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import norms, soil_metrics
+from . import norms, soil_metrics, stability_metrics
 from .metric_base import MetricError, need, nonzero
 from .results import TENSOR, ResultError
 from .spelling import did_you_mean
@@ -177,6 +177,7 @@ GROUPS = {
     "angular_momentum": (angular_momentum, [("angular_momentum", "retained"), ("angular_momentum", "error")]),
     "spurious_stress": (spurious_stress, [("spurious_stress", "max")]),
     **soil_metrics.GROUPS,
+    **stability_metrics.GROUPS,
 }
 
 

@@ -14,6 +14,7 @@ from .figures import FigureError, draw, label_of
 from .page import inline_svg, render
 from .results import ResultError
 from .study_file import StudyError
+from .stability_page import stability_section
 from .style import RC, WIDTH, Style, plt
 from .tables import Table, as_csv, as_latex, study_tables, targets_table
 from .targets import judge_all
@@ -23,6 +24,9 @@ def find_studies(folders):
     """Folders of studies: those given, or those inside a given one."""
     found = []
     for folder in map(Path, folders):
+        if folder.is_file():
+            raise StudyError(f"{folder}: is a file; a report takes the folder of a study, which `testbed study STUDY.toml -o DIR` "
+                             "makes of its runs. One result opens in ParaView by its .xdmf")
         if not folder.is_dir():
             raise StudyError(f"{folder}: no such folder")
         if (folder / "study.toml").is_file():
@@ -103,7 +107,7 @@ def _study_section(study, style, out, command, failures):
     figures, used = [], Counter()
     for entry in study.spec.figures:
         what = (entry.get("quantity") or entry.get("component") or " ".join(filter(None, (entry.get("y"), entry.get("x"))))
-                or "deformed_grid")
+                or ("deformed_grid" if entry.get("deformed_grid") else ""))
         name = slug(entry.get("name") or "_".join(filter(None, (entry["kind"], what, entry.get("norm", "")))))
         used[name] += 1
         name = f"{slug(study.name)}_{name}" + (f"_{used[name]}" if used[name] > 1 else "")
@@ -126,13 +130,26 @@ def _study_section(study, style, out, command, failures):
         finally:
             plt.close("all")
         figures.append(shown)
-    tables = study_tables(study)
-    counts = Counter(run.status for run in study.runs)
+    stability, files = None, []
+    if study.spec.cases:
+        stability, tables, files = stability_section(study, style, out, slug(study.name))
+    else:
+        tables = study_tables(study)
+    for table in files:
+        _write_table(out, study, table)
+    counts = Counter("suspect" if run.suspect else run.status for run in study.runs)
     summary = f"{len(study.runs)} runs: " + ", ".join(f"{n} {status}" for status, n in counts.items()) + "."
     if study.left_out:
         summary += f" {len(study.left_out)} combinations left out."
     return {"anchor": f"study-{slug(study.name)}", "title": study.spec.title, "purpose": study.spec.purpose,
-            "summary": summary, "figures": figures, "tables": tables}
+            "summary": summary, "figures": figures, "tables": tables, "stability": stability}
+
+
+def _write_table(out, study, table):
+    """A table for print and for other programs."""
+    base = out / "tables" / f"{slug(study.name)}_{slug(table.name)}"
+    write_atomically(base.with_suffix(".csv"), as_csv(table))
+    write_atomically(base.with_suffix(".tex"), as_latex(table))
 
 
 def _bench_section(path, style, out, failures):
@@ -171,22 +188,26 @@ def _write_gallery(out, title, sections):
     return bool(shown)
 
 
-def build(folders, out, command):
-    """Writes the report of studies into the folder `out`; returns the path of the page."""
+def build(folders, out, command, unreadable=None):
+    """Writes the report of studies into the folder `out`; returns the path of the page. `unreadable`: a list for what could not be read."""
     out = Path(out)
     studies, failures = [], []
+    unreadable = [] if unreadable is None else unreadable
     for folder in find_studies(folders):
         try:
             studies.append(read_study_folder(folder))
         except StudyError as error:
             failures.append([folder.name, "the whole study", "unreadable",
                              str(error).replace(str(folder) + os.sep, "")])
+            unreadable.append(str(error))
     for name in ("figures", "tables"):
         (out / name).mkdir(parents=True, exist_ok=True)
     for study in studies:
         for run in study.runs:
-            if not run.completed:
-                failures.append([study.name, run.id, run.status, run.reason])
+            if (run.suspect or not run.completed) and not study.spec.cases:  # the matrix tells of these
+                failures.append([study.name, run.id, run.label, run.told])
+            if run.status == "unreadable":
+                unreadable.append(f"{study.name}: {run.id}: {run.reason}")
             failures += [[study.name, run.id, "number missing", error] for error in run.errors]
     benches = [path for path in (Path(folder) / bench.FILE for folder in folders) if path.is_file()]
     style = Style(_figure_labels(studies) + _bench_labels(benches))
@@ -194,9 +215,7 @@ def build(folders, out, command):
     sections = [_study_section(study, style, out, command, failures) for study in studies]
     for (study, judged), section in zip(verdicts, sections):
         for table in section["tables"] + ([targets_table(judged)] if judged else []):
-            base = out / "tables" / f"{slug(study.name)}_{slug(table.name)}"
-            write_atomically(base.with_suffix(".csv"), as_csv(table))
-            write_atomically(base.with_suffix(".tex"), as_latex(table))
+            _write_table(out, study, table)
     sections += [section for path in benches if (section := _bench_section(path, style, out, failures))]
     rows, warnings = provenance(studies, command)
     flat = [(study.name, v) for study, judged in verdicts for v in judged]
@@ -226,10 +245,14 @@ def main(arguments=None):
     except SystemExit as stop:
         return 1 if stop.code else 0
     out = Path(options.output) if options.output else Path(options.folders[0]).resolve().parent / "report"
+    unreadable = []
     try:
-        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]))
+        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]), unreadable)
     except (StudyError, OSError) as error:
         print(f"testbed report: {error}", file=sys.stderr)
         return 1
     print(os.path.relpath(page))
-    return 0
+    if unreadable:
+        more = f"\n  and {len(unreadable) - 20} more" if len(unreadable) > 20 else ""
+        print("testbed report: these could not be read, the report goes without them:\n  " + "\n  ".join(unreadable[:20]) + more, file=sys.stderr)
+    return 1 if unreadable else 0

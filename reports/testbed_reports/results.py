@@ -1,9 +1,12 @@
 """Reading one result file (docs/file_formats.md), checked, with errors that name the file and what it lacks."""
+import math
 import tomllib
 from pathlib import Path
 
 import h5py
 import numpy as np
+
+from .guarded import DamagedError, ensure_readable
 
 FINISHED = ("completed", "diverged", "time_limit")
 STATUSES = FINISHED + ("interrupted",)
@@ -31,6 +34,14 @@ def _plain(value):
 
 def _attributes(node):
     return {key: _plain(value) for key, value in node.attrs.items()}
+
+
+def _is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+# What the tables of a resolved scene are, as far as they are read: a table, or a list of tables.
+SCENE_TABLES = {"grid": dict, "report": dict, "probe": list, "wall": list, "material": list, "body": list}
 
 
 class Snapshot:
@@ -71,6 +82,7 @@ class Result:
     def __init__(self, path):
         self.path = Path(path)
         try:
+            ensure_readable(self.path)
             with h5py.File(self.path, "r") as file:
                 self.root = _attributes(file)
                 if self.root.get("format") != FORMAT:
@@ -78,6 +90,9 @@ class Result:
                 if self.root.get("format_version") != VERSION:
                     raise ResultError(f"{self.path}: format_version {self.root.get('format_version')}, "
                                       f"this program reads {VERSION}")
+                for name in ("case", "title", "method", "variant", "kinematics", "status", "reason"):
+                    if not isinstance(self.root.get(name, ""), str):
+                        raise ResultError(f"{self.path}: the attribute '{name}' is no text")
                 for name in ("case", "method", "variant", "status"):
                     if name not in self.root:
                         raise ResultError(f"{self.path}: lacks the attribute '{name}'")
@@ -99,12 +114,47 @@ class Result:
                                   for name, node in sorted(file.get("snapshots", {}).items(), key=lambda item: (len(item[0]), item[0]))]
         except ResultError:
             raise
+        except DamagedError as error:
+            raise ResultError(f"{self.path}: {error}") from error
         except Exception as error:  # h5py raises many kinds for a damaged file
             raise ResultError(f"{self.path}: cannot be read: {error}") from error
+        self._check_numbers()
+        self.resolved = self._read_scene()
+
+    def _check_numbers(self):
+        """What is counted with must be a number."""
+        for group, attributes in (("performance", self.performance), ("performance/phases", self.phases)):
+            for name, value in attributes.items():
+                if not _is_number(value):
+                    raise ResultError(f"{self.path}: the attribute '{name}' of /{group} is no number")
+        for snapshot in self.snapshots:
+            if not _is_number(snapshot.time) or not math.isfinite(snapshot.time):
+                raise ResultError(f"{self.path}: snapshot {snapshot.name} has no time")
+        for name in ("metrics", "resolved"):
+            if not isinstance(self.scene.get(name, ""), str):
+                raise ResultError(f"{self.path}: the attribute '{name}' of /scene is no text")
+        points = self.scene.get("points_per_cell", 1)
+        if not _is_number(points) or not 1 <= points < 1e6:
+            raise ResultError(f"{self.path}: the attribute 'points_per_cell' of /scene is {points!r}")
+        for material, attributes in self.materials.items():
+            for name in ("density", "youngs_modulus", "poissons_ratio", "constrained_modulus"):
+                if not _is_number(attributes.get(name, 0)):
+                    raise ResultError(f"{self.path}: the attribute '{name}' of material '{material}' is no number")
+
+    def _read_scene(self):
+        """The resolved scene, parsed."""
         try:
-            self.resolved = tomllib.loads(self.scene.get("resolved", ""))
-        except tomllib.TOMLDecodeError as error:
+            scene = tomllib.loads(self.scene.get("resolved", ""))
+        except (tomllib.TOMLDecodeError, RecursionError) as error:
             raise ResultError(f"{self.path}: the resolved scene is not TOML: {error}") from error
+        report = scene.get("report")
+        tables = [(name, kind, scene.get(name, kind())) for name, kind in SCENE_TABLES.items()]
+        if isinstance(report, dict):
+            tables += [(f"report.{name}", kind, report.get(name, kind())) for name, kind in (("reference", dict), ("curve", list))]
+        for name, kind, value in tables:
+            if not isinstance(value, kind) or (kind is list and not all(isinstance(v, dict) for v in value)):
+                raise ResultError(f"{self.path}: '{name}' of the resolved scene is no {'table' if kind is dict else 'list of tables'}")
+        return scene
 
     # What a run is called in tables.
     case = property(lambda self: self.root["case"])
@@ -112,6 +162,17 @@ class Result:
     variant = property(lambda self: self.root["variant"])
     status = property(lambda self: self.root["status"])
     reason = property(lambda self: self.root.get("reason", ""))
+    # What the guards of the run said; files of other codes, and older ones, say nothing.
+    suspect = property(lambda self: [line for line in self.root.get("suspect", "").splitlines() if line])
+    cause = property(lambda self: self.root.get("cause", ""))
+    remedy = property(lambda self: self.root.get("remedy", ""))
+
+    @property
+    def soundness(self):
+        """'sound', 'suspect: CODE, ...', or '' where the file does not tell."""
+        told = self.root.get("soundness", "")
+        codes = ", ".join(dict.fromkeys(line.split(":")[0] for line in self.suspect))
+        return f"{told}: {codes}" if told == "suspect" and codes else told
 
     @property
     def finished(self):
@@ -122,7 +183,10 @@ class Result:
         """Cell size L [m]."""
         if "cell_size" not in self.scene:
             raise ResultError(f"{self.path}: lacks the attribute 'cell_size' of /scene")
-        return float(self.scene["cell_size"])
+        size = self.scene["cell_size"]
+        if not _is_number(size) or not math.isfinite(size) or not size > 0:
+            raise ResultError(f"{self.path}: the attribute 'cell_size' of /scene is {size!r}, not a length")
+        return float(size)
 
     @property
     def metrics(self):
@@ -194,8 +258,11 @@ class Result:
         return self.dataset(f"history/supports/{support}/{name}")
 
     def has(self, name):
-        with h5py.File(self.path, "r") as file:
-            return name in file
+        try:
+            with h5py.File(self.path, "r") as file:
+                return name in file
+        except Exception as error:
+            raise ResultError(f"{self.path}: cannot be read: {error}") from error
 
     @property
     def final(self):

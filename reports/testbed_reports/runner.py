@@ -9,7 +9,7 @@ from pathlib import Path
 
 from .results import FINISHED, Result, ResultError
 
-DONE_CODES = (0, 2, 3)
+DONE_CODES = (0, 2, 3, 5)
 _PR_SET_PDEATHSIG = 1
 
 

@@ -12,11 +12,13 @@ import signal
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from pathlib import Path
 
 from .dataset import PLAN, metrics_csv, read_study_folder, write_atomically
 from .results import is_finished, seed_of
 from .runner import Task, run_all
+from .search import Searches, name_of
 from .study_file import StudyError, read_study, toml_value
 from .targets import as_text, judge_all
 
@@ -49,8 +51,8 @@ def is_fem(method):
 
 
 def case_of(combination):
-    """The name of the folder that holds the scene, as the solver writes it."""
-    return combination.scene.resolve().parent.name
+    """The name of the study's [[case]], else of the folder that holds the scene, as the solver writes it."""
+    return combination.case or combination.scene.resolve().parent.name
 
 
 def points_per_cell(resolved):
@@ -67,9 +69,9 @@ def digest(*parts, length=8):
     return sha.hexdigest()[:length]
 
 
-def readable(method, axes, repeat):
+def readable(method, axes, repeat, case=""):
     """'lpfdm_L0.5_r1': what a run is, as a folder's name."""
-    parts = [method]
+    parts = [case, method] if case else [method]
     for key, value in axes.items():
         if key == "scene":
             parts.insert(0, Path(value).parent.name)
@@ -113,18 +115,25 @@ def method_of(scene):
         raise StudyError(f"{scene}: {error}") from error
 
 
-def expand(study, testbed, folder, keep, jobs):
-    """(plan, tasks): every run of the study with its id, and those that are not finished."""
+def rerun_command(combination):
+    """What a reader types to make a run again."""
+    arguments = run_arguments(combination)
+    return shlex.join(["testbed", "run", os.path.normpath(arguments[0]), *arguments[1:], "--threads", str(combination.threads),
+                       "-o", "result.h5"])
+
+
+def expand(study, combinations, testbed, folder, keep, jobs):
+    """(entries of the plan, combinations left out, tasks): every run of some combinations with its id, and those not finished."""
     fem = testbed.with_name("testbed-fem")
     binaries = {False: testbed.read_bytes(), True: fem.read_bytes() if fem.is_file() else None}
     hashes = {key: digest(data, length=4) for key, data in binaries.items() if data is not None}
 
     chosen, left_out = [], []
-    for combination in study.combinations:
+    for combination in combinations:
         method = combination.method or method_of(combination.scene)
         if is_fem(method) and binaries[True] is None:
             left_out.append({"axes": combination.axes, "case": case_of(combination), "variant": method, "method": "fem",
-                             "L": combination.axes.get("grid.cell_size"), "reason": FEM_MISSING})
+                             "L": combination.axes.get("grid.cell_size"), "reason": FEM_MISSING, "search": name_of(combination)})
         else:
             chosen.append((combination, method))
     with concurrent.futures.ThreadPoolExecutor(max(1, jobs)) as pool:
@@ -141,7 +150,7 @@ def expand(study, testbed, folder, keep, jobs):
     entries, tasks = [], []
     for (combination, method), (text, resolved) in zip(chosen, scenes):
         for repeat in range(1, study.repeats + 1):
-            name = readable(method, combination.axes, repeat)
+            name = readable(method, combination.axes, repeat, combination.case)
             stem = f"{name}_{digest(text, repeat, combination.threads)}"
             run_id = f"{stem}-{hashes[is_fem(method)]}"
             runs = folder / "runs"
@@ -151,18 +160,17 @@ def expand(study, testbed, folder, keep, jobs):
                     run_id = max(old, key=lambda p: p.stat().st_mtime).name
             entries.append({"id": run_id, "case": case_of(combination), "method": family(method), "variant": method,
                             "L": resolved.get("grid", {}).get("cell_size"), "ppc": points_per_cell(resolved),
-                            "seed": seed_of(resolved), "axes": combination.axes, "repeat": repeat, "outcome": ""})
+                            "seed": seed_of(resolved), "axes": combination.axes, "repeat": repeat, "outcome": "",
+                            "command": rerun_command(combination), "search": name_of(combination)})
             out = runs / run_id
             if not is_finished(out / "result.h5"):
                 command = [str(testbed), "run", *run_arguments(combination), "--threads", str(combination.threads),
                            "-o", str(out / "result.h5"), "--quiet"]
                 tasks.append(Task(run_id, out, command))
-    ids = [e["id"] for e in entries]
-    twice = next((i for i in ids if ids.count(i) > 1), None)
+    twice = next((i for i, n in Counter(e["id"] for e in entries).items() if n > 1), None)
     if twice:
         raise StudyError(f"{study.path}: two combinations resolve to the same run {twice}: an axis has no effect")
-    return {"study": str(study.path), "jobs": jobs, "cores": os.cpu_count(), "runs": entries,
-            "left_out": left_out}, tasks
+    return entries, left_out, tasks
 
 
 class Progress:
@@ -204,6 +212,16 @@ class Progress:
         self._clear()
 
 
+def _write_plan(folder, plan):
+    """plan.json, and what was left out in words."""
+    if plan["left_out"]:
+        lines = [f"{readable(e['variant'], e['axes'], 1)[:-3]}: {e['reason']}" for e in plan["left_out"]]
+        write_atomically(folder / "left_out.txt", "\n".join(lines) + "\n")
+    else:
+        (folder / "left_out.txt").unlink(missing_ok=True)
+    write_atomically(folder / PLAN, json.dumps(plan, indent=1) + "\n")
+
+
 def run_study(study, testbed, out, jobs, keep, quiet, command):
     """Runs one study in out/<name>. Returns (list of problems, interrupted)."""
     folder = Path(out) / study.name
@@ -213,31 +231,33 @@ def run_study(study, testbed, out, jobs, keep, quiet, command):
             fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise StudyError(f"{folder}: another study process works in this folder") from None
-        plan, tasks = expand(study, testbed, folder, keep, jobs)
-        plan["command"] = command
         write_atomically(folder / "study.toml", study.path.read_text(encoding="utf-8"))
-        left_out = folder / "left_out.txt"
-        if plan["left_out"]:
-            lines = [f"{readable(e['variant'], e['axes'], 1)[:-3]}: {e['reason']}" for e in plan["left_out"]]
-            write_atomically(left_out, "\n".join(lines) + "\n")
-        else:
-            left_out.unlink(missing_ok=True)
-        write_atomically(folder / PLAN, json.dumps(plan, indent=1) + "\n")
-        progress = Progress(study.name, len(tasks), quiet)
-        finished = len(plan["runs"]) - len(tasks)
-        progress.say(f"{study.name}: {len(plan['runs'])} runs, {finished} finished already, {len(tasks)} to do")
-        if plan["left_out"]:
-            progress.say(f"{study.name}: {len(plan['left_out'])} combinations left out: {plan['left_out'][0]['reason']}")
-        interrupted = False
-        try:
-            outcomes = run_all(tasks, jobs, progress.tell, progress.tick)
-        except KeyboardInterrupt as stop:
-            outcomes, interrupted = (stop.args[0] if stop.args else []), True
-        progress.close()
-        failed = {o.task.id: o.reason or o.status for o in outcomes if not o.done}
+        plan = {"study": str(study.path), "jobs": jobs, "cores": os.cpu_count(), "runs": [], "left_out": [], "command": command}
+        searches, failed, interrupted = Searches(study, folder), {}, False
+        waiting = [c for c in study.combinations if not c.bisection] + searches.next([])
+        while waiting and not interrupted:
+            entries, left_out, tasks = expand(study, waiting, testbed, folder, keep, jobs)
+            first = not plan["runs"]
+            plan["runs"] += entries
+            plan["left_out"] += left_out
+            searches.forget(left_out)
+            _write_plan(folder, plan)
+            progress = Progress(study.name, len(tasks), quiet)
+            if first or tasks:
+                progress.say(f"{study.name}: {len(entries)} runs" + ("" if first else " to search on")
+                             + f", {len(entries) - len(tasks)} finished already, {len(tasks)} to do")
+            if first and plan["left_out"]:
+                progress.say(f"{study.name}: {len(plan['left_out'])} combinations left out: {plan['left_out'][0]['reason']}")
+            try:
+                outcomes = run_all(tasks, jobs, progress.tell, progress.tick)
+            except KeyboardInterrupt as stop:
+                outcomes, interrupted = (stop.args[0] if stop.args else []), True
+            progress.close()
+            failed.update({o.task.id: o.reason or o.status for o in outcomes if not o.done})
+            waiting = [] if interrupted else searches.next(plan["runs"])
         for entry in plan["runs"]:
             entry["outcome"] = failed.get(entry["id"], "")
-        write_atomically(folder / PLAN, json.dumps(plan, indent=1) + "\n")
+        _write_plan(folder, plan)
         data = read_study_folder(folder)
         write_atomically(folder / "metrics.csv", metrics_csv(data.runs))
         for run in data.runs:

@@ -1,14 +1,13 @@
-"""The study file: strict reading of its keys, and the expansion of its axes into combinations."""
-import itertools
-import json
-import math
+"""The study file: strict reading of its keys; its axes become combinations."""
 import re
 import tomllib
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .combinations import expand_axes
 from .spelling import did_you_mean
+from .values import flatten, matches, same, toml_value  # noqa: F401 (offered here to others)
 
 NUMBER, TEXT, LIST, TABLE, FLAG = (int, float), (str,), (list,), (dict,), (bool,)
 TYPE_NAMES = {NUMBER: "a number", TEXT: "a string", LIST: "a list", TABLE: "a table", FLAG: "true or false",
@@ -16,10 +15,15 @@ TYPE_NAMES = {NUMBER: "a number", TEXT: "a string", LIST: "a list", TABLE: "a ta
               NUMBER + LIST: "a number or a list of numbers", TEXT + NUMBER: "a string or a number"}
 
 STUDY_KEYS = {"title": TEXT, "purpose": TEXT, "scene": TEXT, "repeats": (int,), "threads": (int,), "set": TABLE,
-              "axes": TABLE, "exclude": LIST, "override": LIST, "target": LIST, "figure": LIST}
+              "axes": TABLE, "exclude": LIST, "override": LIST, "case": LIST, "failure": LIST, "remedy": LIST, "target": LIST, "figure": LIST}
+CASE_KEYS = {"name": TEXT, "title": TEXT, "scene": TEXT, "purpose": TEXT, "parameter": TEXT, "set": TABLE, "axes": TABLE,
+             "exclude": LIST, "override": LIST, "bound": LIST}
+BOUND_KEYS = {"quantity": TEXT, "norm": TEXT, "min": NUMBER, "max": NUMBER, "failed": NUMBER, "where": TABLE, "source": TEXT}
+FAILURE_KEYS = {"name": TEXT, "title": TEXT, "text": TEXT, "where": TABLE, "component": TEXT, "snapshot": (int,), "range": LIST}
+REMEDY_KEYS = {"failure": TEXT, "label": TEXT, "without": TABLE, "with": TABLE}
 
 # What a `where` may choose runs by, besides the axes of the study.
-COLUMNS = ("case", "method", "variant", "L", "ppc", "dt", "seed", "repeat")
+COLUMNS = ("case", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "bracket")
 
 TARGET_KEYS = {"label": TEXT, "quantity": TEXT, "norm": TEXT, "where": TABLE, "kind": TEXT, "value": NUMBER,
                "low": NUMBER, "high": NUMBER, "L_from": NUMBER, "L_to": NUMBER, "source": TEXT}
@@ -46,6 +50,7 @@ FIGURE_KINDS = {
     "history": ({"quantity": TEXT}, {"probe": TEXT, "support": TEXT, "L": NUMBER + LIST, "scale_x": TEXT + NUMBER,
                                      "scale_y": TEXT + NUMBER, "log": FLAG, "t_max": NUMBER}),
     "bars": ({"quantity": TEXT}, {"norm": TEXT, "L": NUMBER, "log": FLAG}),
+    "stability_matrix": ({}, {}),
 }
 WIDTHS = ("column", "page")
 PATTERNS = ("checker", "strata")
@@ -56,13 +61,19 @@ class StudyError(Exception):
 
 
 @dataclass
-class Combination:
-    """One member of the product of the axes: what it sets, before repeats."""
+class Case:
+    """One [[case]]: `parameter` is the axis whose values are the columns of the stability matrix, `bounds` what makes a run wrong."""
+    name: str
+    title: str
+    scene: str
+    purpose: str
+    parameter: str
     axes: dict
-    sets: dict
-    scene: Path
-    method: str | None
-    threads: int
+    bounds: list
+
+    @property
+    def axis_keys(self):
+        return list(self.axes)
 
 
 @dataclass
@@ -75,6 +86,9 @@ class StudyFile:
     combinations: list
     targets: list = field(default_factory=list)
     figures: list = field(default_factory=list)
+    cases: list = field(default_factory=list)
+    failures: list = field(default_factory=list)
+    remedies: list = field(default_factory=list)
 
     @property
     def name(self):
@@ -104,48 +118,6 @@ def line_of(text, key, table="", index=0):
         if inline.search(line):
             return number
     return None
-
-
-def flatten(table, prefix=""):
-    """Nested tables as one with dotted keys: `time.cfl = 1` and `"time.cfl" = 1` mean the same."""
-    flat = {}
-    for key, value in table.items():
-        if isinstance(value, dict):
-            flat.update(flatten(value, f"{prefix}{key}."))
-        else:
-            flat[prefix + key] = value
-    return flat
-
-
-def toml_value(value):
-    """A value in TOML syntax, for `--set key=value`."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return repr(value) if math.isfinite(value) else str(value)
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, list):
-        return "[" + ", ".join(toml_value(v) for v in value) + "]"
-    raise ValueError(f"a value of type {type(value).__name__} cannot be set")
-
-
-def same(a, b):
-    """Equality of values; numbers to relative 1e-9."""
-    numbers = isinstance(a, NUMBER) and isinstance(b, NUMBER) and not isinstance(a, bool) and not isinstance(b, bool)
-    return math.isclose(a, b, rel_tol=1e-9) if numbers else a == b
-
-
-def matches(values, where):
-    """Whether `values` satisfies every key of `where`; a list means any of its members."""
-    for key, wanted in where.items():
-        options = wanted if isinstance(wanted, list) and not isinstance(values.get(key), list) else [wanted]
-        has = [values.get(key)] + ([values.get("variant")] if key == "method" else [])
-        if not any(same(h, o) for h in has for o in options):
-            return False
-    return True
 
 
 class _Reader:
@@ -187,11 +159,87 @@ class _Reader:
             self.fail(f"unknown {key} '{value}' in [[{table}]] number {index + 1}{did_you_mean(value, known)}",
                       key, table, index)
 
-    def tables(self, name):
-        for index, entry in enumerate(self.data.get(name, [])):
+    def tables(self, name, block=None):
+        """(index, table) of [[name]] in the file, or in a block of it."""
+        for index, entry in enumerate((self.data if block is None else block).get(name, [])):
             if not isinstance(entry, dict):
                 self.fail(f"'{name}' must be tables: [[{name}]]", name)
             yield index, entry
+
+
+def _scenes(reader, data, need_scene):
+    """The scenes of the study; none where its cases name them."""
+    scenes = data.get("axes", {}).get("scene", [data["scene"]] if "scene" in data else [])
+    if "case" in data and scenes:
+        reader.fail("'scene' is given, and [[case]]s name theirs, too", "scene")
+    if not scenes and "case" not in data:
+        raise StudyError(f"{reader.path}: lacks the key 'scene' (or an axis 'scene')")
+    if "scene" in data and "scene" in data.get("axes", {}):
+        reader.fail("'scene' is given and is an axis, too", "scene")
+    for name in scenes if isinstance(scenes, list) else []:
+        if not isinstance(name, str) or need_scene and not (reader.path.parent / name).is_file():
+            reader.fail(f"'scene': no such file: {name}", "scene", "" if "scene" in data else "axes")
+    return scenes
+
+
+def _read_bounds(reader, case, axes, counted):
+    bounds = []
+    for index, entry in reader.tables("bound", case):
+        number = counted + index
+        reader.check(entry, BOUND_KEYS, "case.bound", number)
+        if "quantity" not in entry or not {"min", "max"} & set(entry):
+            reader.fail(f"[[case.bound]] number {number + 1} needs 'quantity' and 'min' or 'max'", "bound", "case.bound", number)
+        where = flatten(entry.get("where", {}))
+        for key in where:
+            if key not in set(COLUMNS) | set(axes):
+                reader.fail(f"unknown key '{key}' in 'where' of [[case.bound]] number {number + 1}{did_you_mean(key, axes)}", key,
+                            "case.bound", number)
+        bounds.append({**entry, "where": where})
+    return bounds
+
+
+def _read_cases(reader, data, threads, need_scene):
+    """(combinations, cases, axes of all) of a study of [[case]]s, which share its [axes] and [set]."""
+    for key in ("exclude", "override"):
+        if key in data:
+            reader.fail(f"[[{key}]] belongs to a case here: [[case.{key}]]", key)
+    common_axes, common_sets = flatten(data.get("axes", {})), flatten(data.get("set", {}))
+    combinations, cases, every, bounds = [], [], {}, 0
+    for index, entry in reader.tables("case"):
+        reader.check(entry, CASE_KEYS, "case", index)
+        reader.need(entry, ("name", "scene", "parameter", "bound"), "case", index, "the case")
+        name = entry["name"]
+        if not re.fullmatch(r"\w+", name) or any(case.name == name for case in cases):
+            reader.fail(f"'name' in [[case]] number {index + 1} must be a word of its own, not '{name}'", "name", "case", index)
+        if need_scene and not (reader.path.parent / entry["scene"]).is_file():
+            reader.fail(f"'scene': no such file: {entry['scene']}", "scene", "case", index)
+        own, axes = expand_axes(reader, entry, [entry["scene"]], threads, name, common_axes, common_sets)
+        if entry["parameter"] not in axes:
+            reader.fail(f"'parameter' of case '{name}' is not an axis{did_you_mean(entry['parameter'], axes)}", "parameter", "case", index)
+        cases.append(Case(name, entry.get("title", name.replace("_", " ")), entry["scene"], entry.get("purpose", ""), entry["parameter"],
+                          axes, _read_bounds(reader, entry, axes, bounds)))
+        bounds += len(entry["bound"])
+        combinations += own
+        every.update(axes)
+    return combinations, cases, every
+
+
+def _read_failures(reader, cases, check_where):
+    """([[failure]] classes, [[remedy]] tables) of a study of cases."""
+    failures, remedies = [], []
+    for table, keys, needed in (("failure", FAILURE_KEYS, ("name", "title", "text", "where", "component")),
+                                ("remedy", REMEDY_KEYS, ("failure", "label", "without", "with"))):
+        for index, entry in reader.tables(table):
+            if not cases:
+                reader.fail(f"[[{table}]] belongs to a study of [[case]]s", table)
+            reader.check(entry, keys, table, index)
+            reader.need(entry, needed, table, index, f"the {table}")
+            for key in {"where", "without", "with"} & set(entry):
+                entry = {**entry, key: check_where({"where": entry[key]}, table, index)}
+            (failures if table == "failure" else remedies).append(entry)
+    for index, entry in enumerate(remedies):
+        reader.choice(entry["failure"], [f["name"] for f in failures], "failure", "remedy", index)
+    return failures, remedies
 
 
 def read_study(path, need_scene=True):
@@ -201,77 +249,20 @@ def read_study(path, need_scene=True):
     reader.check(data, STUDY_KEYS)
     if "title" not in data:
         raise StudyError(f"{path}: lacks the key 'title'")
-    scenes = data.get("axes", {}).get("scene", [data["scene"]] if "scene" in data else [])
-    if not scenes:
-        raise StudyError(f"{path}: lacks the key 'scene' (or an axis 'scene')")
-    if "scene" in data and "scene" in data.get("axes", {}):
-        fail("'scene' is given and is an axis, too", "scene")
-    for name in scenes if isinstance(scenes, list) else []:
-        if not isinstance(name, str) or need_scene and not (reader.path.parent / name).is_file():
-            fail(f"'scene': no such file: {name}", "scene", "" if "scene" in data else "axes")
+    scenes = _scenes(reader, data, need_scene)
     for key, least in (("repeats", 1), ("threads", 1)):
         if data.get(key, least) < least:
             fail(f"'{key}' must be at least {least}", key)
 
-    axes, sets = flatten(data.get("axes", {})), flatten(data.get("set", {}))
-    for key, values in axes.items():
-        if not isinstance(values, list) or not values:
-            fail(f"axis '{key}' must be a list with at least one value", key, "axes")
-        if any(same(a, b) for a, b in itertools.combinations(values, 2)):
-            fail(f"axis '{key}' holds a value twice", key, "axes")
-        if key == "method" and not all(isinstance(v, str) for v in values):
-            fail("axis 'method' must hold names of variants", key, "axes")
-        if key in sets:
-            fail(f"'{key}' is set and is an axis, too", key, "set")
-
-    excludes, overrides = [], []
-    for index, entry in reader.tables("exclude"):
-        excludes.append(flatten(entry))
-        for key in excludes[-1]:
-            if key not in axes:
-                fail(f"'{key}' in [[exclude]] number {index + 1} is not an axis{did_you_mean(key, axes)}",
-                     key, "exclude", index)
-    for index, entry in reader.tables("override"):
-        reader.check(entry, {"when": TABLE, "set": TABLE}, "override", index)
-        for key in ("when", "set"):
-            if key not in entry:
-                fail(f"[[override]] number {index + 1} lacks the key '{key}'", "override")
-        when, changes = flatten(entry["when"]), flatten(entry["set"])
-        for key in when:
-            if key not in axes:
-                fail(f"'{key}' in 'when' of [[override]] number {index + 1} is not an axis{did_you_mean(key, axes)}",
-                     key, "override", index)
-        for key in changes:
-            if key in axes:
-                fail(f"'{key}' in 'set' of [[override]] number {index + 1} is an axis", key, "override", index)
-        overrides.append((when, changes))
-
-    combinations, excluded, overridden = [], Counter(), Counter()
-    for values in itertools.product(*axes.values()):
-        chosen = dict(zip(axes, values))
-        out = [i for i, e in enumerate(excludes) if matches(chosen, e)]
-        excluded.update(out)
-        if out:
-            continue
-        combined = dict(sets)
-        combined.update({k: v for k, v in chosen.items() if k not in ("scene", "method", "threads")})
-        for i, (when, changes) in enumerate(overrides):
-            if matches(chosen, when):
-                overridden[i] += 1
-                combined.update(changes)
-        method = combined.pop("method", None)
-        threads = combined.pop("threads", data.get("threads", 1))
-        scene = reader.path.parent / chosen.get("scene", scenes[0])
-        combinations.append(Combination(chosen, combined, scene, chosen.get("method", method),
-                                        chosen.get("threads", threads)))
-    for i in range(len(excludes)):
-        if not excluded[i]:
-            fail(f"[[exclude]] number {i + 1} excludes nothing", next(iter(excludes[i]), "exclude"), "exclude", i)
-    for i, (when, _) in enumerate(overrides):
-        if not overridden[i]:
-            fail(f"[[override]] number {i + 1} applies to nothing", next(iter(when), "when"), "override", i)
-    if not combinations:
-        raise StudyError(f"{path}: every combination is excluded")
+    threads = data.get("threads", 1)
+    if "case" in data:
+        combinations, cases, axes = _read_cases(reader, data, threads, need_scene)
+    else:
+        combinations, axes = expand_axes(reader, data, scenes, threads)
+        cases = []
+        searched = next((k for k, v in axes.items() if isinstance(v, dict)), None)
+        if searched:
+            fail(f"axis '{searched}' can be searched in a [[case]] only, whose bounds say what is sound", searched, "axes")
 
     columns = set(COLUMNS) | set(axes)
 
@@ -346,5 +337,6 @@ def read_study(path, need_scene=True):
                      "series", "figure", index)
         figures.append({**entry, "series": series, "where": check_where(entry, "figure", index)})
 
+    failures, remedies = _read_failures(reader, cases, check_where)
     return StudyFile(reader.path, data["title"], data.get("purpose", ""), data.get("repeats", 1),
-                     combinations, targets, figures)
+                     combinations, targets, figures, cases, failures, remedies)

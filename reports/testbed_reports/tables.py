@@ -179,8 +179,7 @@ def performance_table(study):
                          _range([p.get("particle_steps_per_second") for p in perf]),
                          number(float(perf[0].get("bytes_per_point", math.nan))),
                          (f"{max(loads):.2f}" if loads else "n/a") + (" busy" if busy else ""),
-                         "" if all(r.completed for r in own) else
-                         ", ".join(dict.fromkeys(r.status for r in own if not r.completed))])
+                         ", ".join(dict.fromkeys(r.label for r in own if r.suspect or not r.completed))])
     if not rows:
         return None
     notes = ["Medians of repeats [smallest–largest]; solve is the time of the steps alone."]

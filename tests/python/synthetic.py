@@ -29,10 +29,11 @@ def column(L, ppc):
 def write_result(path, L=1.0, ppc=2, variant="lpfdm", method=None, status="completed", reason="", case="column",
                  metrics="stress, displacement", reference=None, stress_error=0.0, displacement_error=0.0,
                  solve_s=1.0, load=0.5, drop=(), history=None, samples=81, probes=("tip",), scene_extra="", seed=None,
-                 commit="abc1234", overshoot=2.0, damping=0.0, energy_slope=0.0, snapshots=2):
+                 commit="abc1234", overshoot=2.0, damping=0.0, energy_slope=0.0, snapshots=2, attributes=None):
     """Writes a result file whose relative L2 errors are `stress_error` and `displacement_error`; returns its path.
 
-    `drop`: names of datasets left out; `history`: replaces named histories; `energy_slope`: energy made per second.
+    `drop`: names of datasets left out; `history`: replaces named histories; `energy_slope`: energy made per second; `attributes`:
+    further ones of the file.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,7 +71,7 @@ def write_result(path, L=1.0, ppc=2, variant="lpfdm", method=None, status="compl
     with h5py.File(path, "w") as file:
         file.attrs.update(format="testbed-result", format_version=1, case=case, title="Synthetic column",
                           method=method, variant=variant, status=status, reason=reason,
-                          kinematics="small_strain" if method == "fem" else "hypoelastic")
+                          kinematics="small_strain" if method == "fem" else "hypoelastic", **(attributes or {}))
         scene = file.create_group("scene")
         scene.attrs.update(resolved="".join(resolved), cell_size=L, points_per_cell=ppc, metrics=metrics,
                            cell_origin=[0.0, 0.0])

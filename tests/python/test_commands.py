@@ -65,6 +65,9 @@ BAD = [("grid.cel_size=1", "did you mean 'cell_size'"), ("grid.cell_size=\"a lot
        ("material.soil.poissons_ratio=0.5", "poissons_ratio"), ("material.soil.density=-1", "must be positive"),
        ("body.column.velocity=[\"2*spede\", 0]", "spede"), ("boundary.base.where=\"y <\"", "boundary[0].where"),
        ("boundary.base.where=\"y > 99\"", "holds at no node"), ("probe.tip.where=\"Y > 99\"", "holds at no point"),
+       ("boundary.base.where=\"y <= 3 && t < 0.1\"", "'t' is not known here, only x, y"), ("probe.tip.where=\"y > 1\"", "'y' is not known here"),
+       ("body.column.velocity=[\"1/(X-X)\", 0]", "body 'column': velocity"), ("time.end=1e300", "steps of"),
+       ("exact.hypoelastic.displacement=[\"0\", \"1/(4-t)\"]", "exact.hypoelastic.displacement"),
        ("body=[]", "no [[body]]"), ("method=\"mpm\"", "method")]
 
 
@@ -74,6 +77,17 @@ def test_bad_input_is_refused_before_anything_is_written(tmp_path, override, tol
     assert done.returncode == 1, done.stderr
     assert told in done.stderr and "scene.toml" in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("override,told", BAD)
+def test_check_finds_what_run_refuses(override, told):
+    done = run("check", COLUMN, "--set", override)
+    assert done.returncode == 1 and told in done.stderr, done.stderr
+
+
+def test_check_finds_what_fails_at_the_start():
+    done = run("check", COLUMN, "--set", "body.column.velocity=[0, 1e200]", "--method", "mpm-cpgimp")
+    assert done.returncode == 1 and "at the start: " in done.stderr, done.stderr
 
 
 def test_files_that_are_no_scene(tmp_path):

@@ -74,7 +74,7 @@ def test_runs_once_and_grades(bench):
     assert len(bench.calls) == 4 and all(call[3] == "1" for call in bench.calls)
     assert "pass" in done.stdout and "order" in done.stdout
     header = (bench.out / "metrics.csv").read_text().splitlines()[0]
-    assert header == "run_id,case,method,variant,L,ppc,dt,seed,quantity,norm,value,solve_s,particle_steps,status"
+    assert header == "run_id,case,method,variant,L,ppc,dt,seed,quantity,norm,value,solve_s,particle_steps,status,soundness,cause,remedy"
     value = {(r["variant"], float(r["L"])): float(r["value"]) for r in bench.rows if (r["quantity"], r["norm"]) == ("stress", "l2")}
     assert value["lpfdm", 2.0] == pytest.approx(0.08) and value["mpm-linear", 1.0] == pytest.approx(0.02)
     assert all(r["seed"] == "" and r["status"] == "completed" for r in bench.rows)

@@ -1,0 +1,78 @@
+#pragma once
+/// Guards: what a run watches so that a wrong answer does not pass as a right one. Each is small and about one idea; none changes the run.
+
+#include "core/ledger.hpp"
+#include "core/solver.hpp"
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace testbed
+{
+/// What the run looks like when the history is sampled.
+struct GuardSample
+{
+    double t = 0, dt = 0;
+    EnergyBalance energy;
+    double energy_scale = 0;  ///< see Ledger::scale()
+    MotionSums motion;        ///< of the nodes
+    PointSums points;
+    PointMotion point_motion;
+    bool is_fresh = true;  ///< else point_motion is that of an earlier sample, and nothing else that costs a pass is asked for
+};
+
+/// Why a run is suspect. Codes: energy, volume, outside, courant, not_at_rest, separated, contact_lost, small_strain, time_step.
+struct Finding
+{
+    std::string code, sentence;
+};
+
+class Guard
+{
+public:
+    virtual ~Guard() = default;
+    virtual void watch(const GuardSample& sample, const Solver& solver) = 0;
+    /// What is wrong with the run up to the last sample. @param completed to the end of the scene
+    virtual std::optional<Finding> finding(bool completed) const = 0;
+};
+
+/// The limits, each with its reason in docs/methods.md ("Soundness").
+namespace limits
+{
+inline constexpr double energy_gain = 0.02;       ///< of the energy of the run
+inline constexpr double energy_gain_musl = 0.05;  ///< so, where the strain is not that of the velocity that the forces work on
+inline constexpr double smallest_volume = 0.1;    ///< current over initial
+inline constexpr double largest_volume = 10;      ///< so, where the law cannot flow
+inline constexpr double courant = 1;              ///< max |v| dt / L
+inline constexpr double at_rest = 1e-3;           ///< kinetic over strain energy
+inline constexpr double small_strain = 0.05;      ///< of the FEM reference
+}  // namespace limits
+
+class Guards
+{
+public:
+    /// @param dt of the run [s]
+    Guards(const Scene& scene, const Solver& solver, double dt_critical);
+
+    void watch(const GuardSample& sample, const Solver& solver);
+    std::vector<Finding> findings(bool completed) const;
+    /// What is worth a word and not wrong: parts that came off where the law may break.
+    std::string note() const;
+    const std::optional<GuardSample>& last() const { return last_; }
+
+private:
+    std::vector<std::unique_ptr<Guard>> guards_;
+    std::optional<GuardSample> last_;
+    std::function<std::string()> note_;
+};
+
+/// Parts of a body between which no force passes: they share no node. @param reach bins (columns or lines) at which two still share one
+std::size_t connected_parts(const std::vector<Bin>& bins, int reach);
+/// Whether two bodies share a node.
+bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach);
+/// Bins at which two points still share a node.
+int reach_of(const Scene& scene);
+}  // namespace testbed

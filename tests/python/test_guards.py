@@ -1,0 +1,112 @@
+"""Soundness of a run, from the guards to the report: closing line, result file, exit code, metrics, page."""
+import csv
+import io
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from synthetic import write_result, write_study
+from testbed_reports.dataset import metrics_csv, read_study_folder
+from testbed_reports.report import build
+from testbed_reports.results import Result
+
+ROOT = Path(__file__).resolve().parents[2]
+TESTBED = Path(os.environ.get("TESTBED") or ROOT / "build" / "bin" / "testbed")
+COLUMN = str(ROOT / "benchmarks" / "elastic_column" / "scene.toml")
+SUDDEN = str(ROOT / "benchmarks" / "elastic_column_sudden" / "scene.toml")
+FEM = TESTBED.with_name("testbed-fem").exists()
+
+SERIES = ("kinetic_energy_points", "plastic_dissipation", "damping_dissipation", "hourglass_dissipation", "external_work",
+          "numerical_energy", "volume_ratio_min", "volume_ratio_max", "points_outside", "courant_motion")
+
+
+def run(*arguments):
+    return subprocess.run([str(TESTBED), "run", *map(str, arguments)], capture_output=True, text=True, timeout=300)
+
+
+def attributes(path):
+    with h5py.File(path) as file:
+        return dict(file.attrs)
+
+
+def test_a_sound_run_says_so(tmp_path):
+    done = run(COLUMN, "--strict", "-o", tmp_path / "r.h5")
+    assert done.returncode == 0 and ": completed, sound;" in done.stderr, done.stderr
+    root = attributes(tmp_path / "r.h5")
+    assert (root["soundness"], root["suspect"], root["cause"], root["remedy"]) == ("sound", "", "", "")
+    with h5py.File(tmp_path / "r.h5") as file:
+        n = file["history/time"].shape
+        assert all(file["history"][name].shape == n for name in SERIES)
+        h = {name: file["history"][name][()] for name in (*SERIES, "kinetic_energy", "strain_energy")}
+        share = file["performance"].attrs["guards_s"] / file["performance"].attrs["solve_s"]
+    assert share < 0.05  # of a run of a tenth of a second
+    assert h["external_work"][-1] > 0 and h["damping_dissipation"][-1] == pytest.approx(h["external_work"][-1] - h["strain_energy"][-1], rel=0.02)
+
+
+@pytest.mark.parametrize("method", ["lpfdm", "lpfdm-2000", "mpm-linear", "mpm-bspline", "mpm-cpgimp"])
+def test_energy_ledger_of_a_free_oscillation(tmp_path, method):
+    done = run(SUDDEN, "--method", method, "--strict", "-o", tmp_path / "r.h5")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "r.h5") as file:
+        h = {name: node[()] for name, node in file["history"].items() if isinstance(node, h5py.Dataset)}
+    assert np.abs(h["numerical_energy"]).max() < 5e-3 * h["external_work"].max()
+    assert np.allclose(h["external_work"], h["gravity_work"], atol=0.01 * h["gravity_work"].max())
+
+
+@pytest.mark.parametrize("strict, code", [((), 0), (("--strict",), 5)])
+def test_a_suspect_run_says_so(tmp_path, strict, code):
+    done = run(COLUMN, "--set", "time.end=0.55", *strict, "-o", tmp_path / "r.h5")
+    assert done.returncode == code, done.stderr
+    assert "completed, suspect: not_at_rest" in done.stderr and "suspect: not_at_rest: it was to come to rest" in done.stderr
+    root = attributes(tmp_path / "r.h5")
+    assert root["status"] == "completed" and root["soundness"] == "suspect" and root["suspect"].startswith("not_at_rest: ")
+
+
+def test_a_quiet_suspect_run_still_says_so(tmp_path):
+    done = run(COLUMN, "--set", "time.end=0.55", "--quiet", "-o", tmp_path / "r.h5")
+    assert done.returncode == 0 and done.stderr.startswith("suspect: not_at_rest: ")
+
+
+def test_time_step_above_the_limit_and_its_remedy(tmp_path):
+    done = run(COLUMN, "--set", "time.cfl=1.3", "--diagnose", "-o", tmp_path / "r.h5")
+    root = attributes(tmp_path / "r.h5")
+    assert root["soundness"] == "suspect" and "time_step" in root["suspect"] and root["cause"] == "time_step", done.stderr
+    assert root["remedy"] == "time.cfl=0.9" and root["remedy_was_run"] == 1
+    assert "cause: time_step; holds with --set time.cfl=0.9" in done.stderr
+    assert attributes(tmp_path / "r.remedy.h5")["soundness"] == "sound"
+
+
+@pytest.mark.skipif(not FEM, reason="testbed-fem is not built")
+def test_fem_strain_beyond_small(tmp_path):
+    done = run(COLUMN, "--method", "fem-q2", "--strict", "-o", tmp_path / "r.h5")
+    assert done.returncode == 0 and ": completed, sound;" in done.stderr, done.stderr
+    done = run(COLUMN, "--method", "fem-q2", "--strict", "--set", "gravity.acceleration=[0, -1e5]", "-o", tmp_path / "r.h5")
+    assert done.returncode == 5 and "suspect: small_strain" in done.stderr, done.stderr
+
+
+def suspect_root(variant):
+    return {"attributes": {"soundness": "suspect", "suspect": "energy: made <2> J/m\nvolume: a point grew", "cause": "null_mode",
+                     "remedy": "lpfdm.hourglass=0.05"}} if variant == "lpfdm" else {}
+
+
+def test_soundness_in_files_metrics_and_page(tmp_path):
+    write_result(tmp_path / "old.h5")
+    old = Result(tmp_path / "old.h5")
+    assert (old.soundness, old.suspect, old.cause, old.remedy) == ("", [], "", "")
+    folder = write_study(tmp_path / "studies" / "s", sizes=(1.0,), change=lambda variant, L, repeat: suspect_root(variant))
+    study = read_study_folder(folder)
+    rows = list(csv.DictReader(io.StringIO(metrics_csv(study.runs))))
+    told = {(r["variant"], r["status"], r["soundness"], r["cause"], r["remedy"]) for r in rows}
+    assert ("lpfdm", "completed", "suspect: energy, volume", "null_mode", "lpfdm.hourglass=0.05") in told
+    assert ("fem-q2", "completed", "", "", "") in told
+    build([folder], tmp_path / "out", "testbed report")
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert '<b class="fail">suspect: energy, volume</b>' in page  # the badge, in the tables
+    text = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page))
+    assert "4 runs: 1 suspect, 3 completed." in text
+    assert "energy: made &lt;2&gt; J/m; volume: a point grew; cause: null_mode, remedy: lpfdm.hourglass=0.05" in text
