@@ -28,7 +28,7 @@ State run(const std::string& name, const std::string& method, const std::vector<
 {
     State s{load_scene(std::string(BENCHMARKS) + "/" + name + "/scene.toml", method, overrides).scene, nullptr};
     s.solver = find_variant(method).family == "mpm" ? make_mpm(s.scene) : make_lpfdm(s.scene);
-    const double dt = time_step(s.scene);
+    const double dt = time_step(s.scene, *s.solver);
     const int steps = static_cast<int>(std::ceil(s.scene.time.end / dt));
     for (int n = 0; n <= steps; ++n)
     {
