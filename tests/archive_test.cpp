@@ -108,13 +108,13 @@ TEST_P(StateOf, EachPartMatters)
 {
     const Scene scene = test::load(pressed_block("smooth"), GetParam().method, GetParam().overrides);
     const auto solver = make(scene);
-    for (int n = 0; n < 300; ++n)
+    for (int n = 0; n < 600; ++n)
         step(*solver, n, 1.5e-3);
     const State start = state_of(*solver);
     const auto after = [&](const State& state)
     {
         restore(*solver, state);
-        for (int n = 300; n < 303; ++n)
+        for (int n = 600; n < 603; ++n)
             step(*solver, n, 1.5e-3);
         return state_of(*solver);
     };
