@@ -425,7 +425,7 @@ size = [6.0, 7.0]
 cell_size = 1.0
 [time]
 end = 1e7
-stop_unbalanced = 5e-10
+stop_unbalanced = 1e-9
 density_scaling = true
 [gravity]
 acceleration = [0.0, -1e-4]
