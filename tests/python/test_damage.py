@@ -143,6 +143,14 @@ def test_plans_that_are_none(tmp_path, plan, capsys):
     assert "plan.json" in capsys.readouterr().err
 
 
+def test_an_array_may_be_there_twice(tmp_path):
+    path = write_result(tmp_path / "result.h5", drop=("snapshots/0001/volume",))
+    with h5py.File(path, "a") as file:
+        file["snapshots/0001/volume"] = file["snapshots/0000/volume"]
+    result = Result(path)
+    assert np.array_equal(result.snapshots[0]["volume"], result.snapshots[1]["volume"])
+
+
 def test_a_link_and_a_loop_are_refused(tmp_path):
     for harm in (lambda f: f.__setitem__("scene/loop", f["/scene"]), lambda f: f.__setitem__("scene/out", h5py.ExternalLink("/etc/passwd", "/"))):
         path = write_result(tmp_path / "result.h5")
