@@ -81,7 +81,7 @@ def test_a_library_that_crashes_hangs_or_wants_all_memory(tmp_path, monkeypatch)
                        (lambda path: np.ones(1 << 40), "MemoryError")):
         monkeypatch.setattr(guarded, "_read_all", harm)
         monkeypatch.setattr(guarded, "SECONDS", 1)
-        monkeypatch.setattr(guarded, "_verdicts", {})
+        monkeypatch.setattr(guarded, "_copies", {})
         with pytest.raises(ResultError, match=re.escape(told)):
             Result(path)
 
