@@ -7,6 +7,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <functional>
+
+// in a header-only build with assertions the parser would abort at a key that begins with no letter, where it goes on to say so
+#ifndef TOML_ASSERT
+#define TOML_ASSERT(expression) static_cast<void>(0)
+#endif
 #include <toml++/toml.h>
 
 namespace testbed

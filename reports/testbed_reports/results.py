@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .guarded import DamagedError, ensure_readable
+from .guarded import DamagedError, open_file, plain
 
 FINISHED = ("completed", "diverged", "time_limit")
 STATUSES = FINISHED + ("interrupted",)
@@ -23,17 +23,8 @@ class ResultError(Exception):
     """A result file that cannot be read, or lacks something that was asked of it."""
 
 
-def _plain(value):
-    """An HDF5 attribute as a plain Python value."""
-    if isinstance(value, bytes):
-        return value.decode()
-    if isinstance(value, np.ndarray):
-        return [_plain(v) for v in value.ravel()] if value.size != 1 else _plain(value.ravel()[0])
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def _attributes(node):
-    return {key: _plain(value) for key, value in node.attrs.items()}
+    return {key: plain(value) for key, value in node.attrs.items()}
 
 
 def _is_number(value):
@@ -82,8 +73,7 @@ class Result:
     def __init__(self, path):
         self.path = Path(path)
         try:
-            ensure_readable(self.path)
-            with h5py.File(self.path, "r") as file:
+            with open_file(self.path) as file:
                 self.root = _attributes(file)
                 if self.root.get("format") != FORMAT:
                     raise ResultError(f"{self.path}: not a testbed result (attribute 'format')")
@@ -228,7 +218,7 @@ class Result:
     def dataset(self, name):
         """A dataset as a float array."""
         try:
-            with h5py.File(self.path, "r") as file:
+            with open_file(self.path) as file:
                 if name not in file:
                     raise ResultError(f"{self.path}: lacks /{name}")
                 return np.asarray(file[name][()], dtype=float)
@@ -240,8 +230,8 @@ class Result:
     def unit(self, name):
         """The unit of a dataset, '' when it is not given."""
         try:
-            with h5py.File(self.path, "r") as file:
-                return str(_plain(file[name].attrs.get("unit", ""))) if name in file else ""
+            with open_file(self.path) as file:
+                return str(plain(file[name].attrs.get("unit", ""))) if name in file else ""
         except Exception as error:
             raise ResultError(f"{self.path}: /{name} cannot be read: {error}") from error
 
@@ -259,7 +249,7 @@ class Result:
 
     def has(self, name):
         try:
-            with h5py.File(self.path, "r") as file:
+            with open_file(self.path) as file:
                 return name in file
         except Exception as error:
             raise ResultError(f"{self.path}: cannot be read: {error}") from error

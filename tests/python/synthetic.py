@@ -6,6 +6,7 @@ u_y = -(rho g / M) (H Y - Y^2 / 2).
 import json
 import math
 import os
+import zlib
 from pathlib import Path
 
 import h5py
@@ -14,6 +15,13 @@ import numpy as np
 RHO, G, M, K0, H = 1000.0, 10.0, 1.0e6, 0.25, 10.0
 TIP = RHO * G * H**2 / (2.0 * M)
 PERIOD = 4.0 * H / math.sqrt(M / RHO)
+
+
+def seal(path):
+    """Ends a file with its checksum, as the testbed does."""
+    data = path.read_bytes()
+    path.write_bytes(data + b"testbed-crc32 %08x %016x\n" % (zlib.crc32(data), len(data)))
+    return path
 
 
 def column(L, ppc):
@@ -29,11 +37,11 @@ def column(L, ppc):
 def write_result(path, L=1.0, ppc=2, variant="lpfdm", method=None, status="completed", reason="", case="column",
                  metrics="stress, displacement", reference=None, stress_error=0.0, displacement_error=0.0,
                  solve_s=1.0, load=0.5, drop=(), history=None, samples=81, probes=("tip",), scene_extra="", seed=None,
-                 commit="abc1234", overshoot=2.0, damping=0.0, energy_slope=0.0, snapshots=2, attributes=None):
+                 commit="abc1234", overshoot=2.0, damping=0.0, energy_slope=0.0, snapshots=2, attributes=None, sealed=True):
     """Writes a result file whose relative L2 errors are `stress_error` and `displacement_error`; returns its path.
 
     `drop`: names of datasets left out; `history`: replaces named histories; `energy_slope`: energy made per second; `attributes`:
-    further ones of the file.
+    further ones of the file; `sealed`: with a checksum at its end.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -107,7 +115,7 @@ def write_result(path, L=1.0, ppc=2, variant="lpfdm", method=None, status="compl
                                        ("exact_displacement", share * exact_u, "m"), ("initial_volume", V0, "m2"),
                                        ("volume", V0, "m2"), ("mass", RHO * V0, "kg/m")):
                 put(f"{where}/{name}", values, unit)
-    return path
+    return seal(path) if sealed else path
 
 
 STUDY = """\

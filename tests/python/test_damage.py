@@ -3,15 +3,14 @@ import os
 import re
 import subprocess
 import sys
-import zlib
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from damage import damaged_copies
-from synthetic import write_result, write_study
-from testbed_reports import guarded, metrics
+from synthetic import seal, write_result, write_study
+from testbed_reports import guarded
 from testbed_reports.dataset import read_run, read_study_folder
 from testbed_reports.report import main as report
 from testbed_reports.results import Result, ResultError
@@ -21,13 +20,11 @@ ROOT = Path(__file__).resolve().parents[2]
 COMMAND = ROOT / "reports" / "testbed-report"
 
 
-def seal(path):
-    """Ends a file with its checksum, as the testbed does."""
+def declared(path):
+    """With the attribute that says so a checksum must be there."""
     with h5py.File(path, "a") as file:
         file.attrs["checksum"] = "crc32 at the end of the file"
-    data = path.read_bytes()
-    path.write_bytes(data + b"testbed-crc32 %08x %016x\n" % (zlib.crc32(data), len(data)))
-    return path
+    return seal(path)
 
 
 def read_everything(path):
@@ -46,7 +43,8 @@ def read_everything(path):
 
 def test_files_of_other_codes_are_read_or_refused(tmp_path):
     """Without a checksum a changed number cannot be told from another; whatever else is wrong is told."""
-    whole, bad = write_result(tmp_path / "whole.h5", metrics="stress, displacement, settlement, static, energy, spurious_stress"), tmp_path / "result.h5"
+    metrics = "stress, displacement, settlement, static, energy, spurious_stress"
+    whole, bad = write_result(tmp_path / "whole.h5", metrics=metrics, sealed=False), tmp_path / "result.h5"
     read, refused = 0, 0
     for what, data in damaged_copies(whole, COUNT, seed=1):
         bad.unlink(missing_ok=True)
@@ -64,7 +62,7 @@ def test_files_of_other_codes_are_read_or_refused(tmp_path):
 
 def test_files_of_the_testbed_are_refused(tmp_path):
     """With a checksum no change goes through: not of a number, not a cut of a single byte."""
-    whole, bad = seal(write_result(tmp_path / "whole.h5")), tmp_path / "result.h5"
+    whole, bad = declared(write_result(tmp_path / "whole.h5", sealed=False)), tmp_path / "result.h5"
     assert Result(whole).status == "completed"
     data = whole.read_bytes()
     cuts = [(f"cut by {n}", data[:-n]) for n in (1, 20, 40, 41, 100)]
@@ -76,12 +74,12 @@ def test_files_of_the_testbed_are_refused(tmp_path):
 
 
 def test_a_library_that_crashes_hangs_or_wants_all_memory(tmp_path, monkeypatch):
-    path = write_result(tmp_path / "result.h5")
+    path = write_result(tmp_path / "result.h5", sealed=False)
     for harm, told in ((lambda path: os.abort(), "crashes on it (SIGABRT)"), (_for_ever, "takes for ever"),
                        (lambda path: np.ones(1 << 40), "MemoryError")):
         monkeypatch.setattr(guarded, "_read_all", harm)
         monkeypatch.setattr(guarded, "SECONDS", 1)
-        monkeypatch.setattr(guarded, "_verdicts", {})
+        monkeypatch.setattr(guarded, "_copies", {})
         with pytest.raises(ResultError, match=re.escape(told)):
             Result(path)
 
@@ -119,7 +117,7 @@ def test_report_goes_on_and_exits_1(tmp_path, capsys):
 def test_command_on_damaged_files(tmp_path):
     folder = write_study(tmp_path / "s", sizes=(1.0,), models={"lpfdm": lambda L: 0.1}, metrics="stress")
     path = next((folder / "runs").glob("*/result.h5"))
-    seal(path)
+    declared(path)
     whole = path.with_name("whole")
     path.rename(whole)
     for what, data in damaged_copies(whole, max(4, COUNT // 100), seed=3):
@@ -141,6 +139,14 @@ def test_plans_that_are_none(tmp_path, plan, capsys):
     (folder / "plan.json").write_text(plan)
     assert report([str(folder), "-o", str(tmp_path / "out")]) == 1
     assert "plan.json" in capsys.readouterr().err
+
+
+def test_an_array_may_be_there_twice(tmp_path):
+    path = write_result(tmp_path / "result.h5", drop=("snapshots/0001/volume",))
+    with h5py.File(path, "a") as file:
+        file["snapshots/0001/volume"] = file["snapshots/0000/volume"]
+    result = Result(path)
+    assert np.array_equal(result.snapshots[0]["volume"], result.snapshots[1]["volume"])
 
 
 def test_a_link_and_a_loop_are_refused(tmp_path):
