@@ -75,7 +75,8 @@ public:
                    [&]
                    {
                        const double rate = options_.hourglass * wave_speed_ / grid_.lattice.cell_size;
-                       node_ops_.note_hourglass(resist_hourglass(grid_, rate, hourglass_x_, hourglass_y_));
+                       const double power = resist_hourglass(grid_, rate, hourglass_x_, hourglass_y_);
+                       node_ops_.note_hourglass((1 - 2 * rate * dt) * power);  // in the middle of the kick half of the decay is done
                    });
         internal_ = force_norm(nodes_);
         timer_("node operations (11)(15)",
