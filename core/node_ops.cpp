@@ -80,7 +80,7 @@ void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, double t)
 {
     if (gravity_)
     {
-        gravity_->apply(nodes, t);
+        gravity_->apply(nodes, weight_of(nodes), t);
         const double factor = gravity_->factor(t);
         gravity_now_ = {factor * gravity_->acceleration[0], factor * gravity_->acceleration[1]};
     }
@@ -117,16 +117,17 @@ void NodeOps::kick(Nodes& nodes, double dt)
 {
     const bool loaded = !load_x_.empty();
     const double before = loaded ? load_power(nodes) : 0;
-    const Kick kick = damping_ ? accelerate(nodes, dt, *damping_) : accelerate(nodes, dt);
+    const Kick kick = damping_ ? accelerate(nodes, weight_of(nodes), dt, *damping_) : accelerate(nodes, weight_of(nodes), dt);
     add_work(kick, loaded ? 0.5 * (before + load_power(nodes)) : 0, dt, work_);
 }
 
 NodalWork NodeOps::work(const Nodes& nodes, double lag) const
 {
+    const std::vector<double>& mass = weight_of(nodes);
     const auto s = sum_over_nodes<3>(nodes,
                                      [&](std::size_t i, const auto& lanes)
                                      {
-                                         const Pack m = lanes.load(&nodes.mass[i]);
+                                         const Pack m = lanes.load(&mass[i]);
                                          const Pack vx = lanes.load(&nodes.vx[i]), vy = lanes.load(&nodes.vy[i]);
                                          Pack taken(0.0);
                                          if (damping_)

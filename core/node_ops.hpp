@@ -26,13 +26,15 @@ struct Gravity
         return linear ? t / ramp : 0.5 * (1 - std::cos(std::numbers::pi * t / ramp));
     }
 
-    void apply(Nodes& nodes, double t) const
+    void apply(Nodes& nodes, double t) const { apply(nodes, nodes.mass, t); }
+    /// @param mass of the nodes, that has weight
+    void apply(Nodes& nodes, const std::vector<double>& mass, double t) const
     {
         const Pack gx(factor(t) * acceleration[0]), gy(factor(t) * acceleration[1]);
         nodes.for_each(
             [&](std::size_t i, const auto& lanes)
             {
-                const Pack m = lanes.load(&nodes.mass[i]);
+                const Pack m = lanes.load(&mass[i]);
                 lanes.store(&nodes.fx[i], lanes.load(&nodes.fx[i]) + gx * m);
                 lanes.store(&nodes.fy[i], lanes.load(&nodes.fy[i]) + gy * m);
             });
@@ -84,9 +86,9 @@ struct NoDamping
 };
 
 /// Eqs. (12), (14): v += F / m dt. Returns the work of the forces, exact to rounding, with the velocity in the middle of the kick.
-/// @param damping that the forces have gone through
+/// @param weight mass of the nodes, that has weight @param damping that the forces have gone through
 template <class Damping = NoDamping>
-Kick accelerate(Nodes& nodes, double dt, const Damping& damping = {})
+Kick accelerate(Nodes& nodes, const std::vector<double>& weight, double dt, const Damping& damping = {})
 {
     const Pack half(0.5);
     const auto s = sum_over_nodes<4>(nodes,
@@ -99,7 +101,8 @@ Kick accelerate(Nodes& nodes, double dt, const Damping& damping = {})
                                          lanes.store(&nodes.vx[i], vx + dx);
                                          lanes.store(&nodes.vy[i], vy + dy);
                                          const Pack mean_x = vx + half * dx, mean_y = vy + half * dy;
-                                         return std::array{m * (dx * mean_x + dy * mean_y), m * mean_x, m * mean_y,
+                                         const Pack w = lanes.load(&weight[i]);
+                                         return std::array{m * (dx * mean_x + dy * mean_y), w * mean_x, w * mean_y,
                                                            damping.taken(fx, vx) * mean_x + damping.taken(fy, vy) * mean_y};
                                      });
     return {s[0], {dt * s[1], dt * s[2]}, dt * s[3]};
@@ -119,6 +122,8 @@ public:
     /// @throws SceneError when a boundary takes no node
     NodeOps(const Scene& scene, const Lattice& lattice);
 
+    /// Gravity takes these masses of the nodes for those that have weight, from now on.
+    void weigh_with(const std::vector<double>& mass) { weight_ = &mass; }
     /// Takes the walls to time t, and to their velocity in the coming step.
     /// @throws Diverged when a wall has left the lattice or has reached what stands in its way
     void begin_step(double t, double dt);
@@ -171,6 +176,7 @@ public:
     const std::vector<Restraint>& restraints() const { return restraints_; }
 
 private:
+    const std::vector<double>& weight_of(const Nodes& nodes) const { return weight_ ? *weight_ : nodes.mass; }
     /// Power of the loads at the present velocity [W/m].
     double load_power(const Nodes& nodes) const;
     void add_work(const Kick& kick, double loads, double dt, NodalWork& work) const;
@@ -183,6 +189,7 @@ private:
     }
 
     std::optional<Gravity> gravity_;
+    const std::vector<double>* weight_ = nullptr;  ///< null: all mass has weight
     std::optional<LocalDamping> damping_;
     std::vector<Restraint> restraints_;  ///< of the boundaries, then of the walls: where two prescribe, the later one does
     std::vector<Wall> walls_;
