@@ -188,7 +188,7 @@ public:
     /// Without the filters of the velocity, which are not in this system.
     std::optional<double> sharp_step_limit() override
     {
-        if (xpic_ || options_.null_space_filter != "none" || options_.mass_cutoff > 0)
+        if (xpic_ || options_.null_space_filter != "none")
             return std::nullopt;
         ElementSystem elements = mpm_elements<Shape, Strain>(lattice_, bodies_);
         fix(elements, node_ops_.restraints(), lattice_);

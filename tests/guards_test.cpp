@@ -85,7 +85,7 @@ Watched watch(const std::string& text, const std::string& method, const std::vec
     Watched w{test::load(text, method, overrides)};
     w.solver = find_variant(method).family == "mpm" ? make_mpm(w.scene) : make_lpfdm(w.scene);
     Observer observer(w.scene, *w.solver);
-    const double dt = time_step(w.scene);
+    const double dt = time_step(w.scene, *w.solver);
     Guards guards(w.scene, *w.solver, w.solver->critical_time_step(w.scene));
     const int steps = static_cast<int>(std::ceil(w.scene.time.end / dt));
     try

@@ -93,6 +93,7 @@ struct RefLpfdm
     std::map<Key, double> old_mass{};
     std::set<Key> faces{};
     double sliver_mass = 0;  ///< below which a node counts as a sliver
+    double last_dt = 0;
     bool first = true;
 
     struct Cell
@@ -268,8 +269,8 @@ struct RefLpfdm
     /// First of the 2 x 2 cells that a box can reach.
     Key bin_of(const RefPoint& p) const
     {
-        return {static_cast<int>(std::floor((p.x - grid.ox) / grid.L - std::min(p.hx / grid.L, 0.5))),
-                static_cast<int>(std::floor((p.y - grid.oy) / grid.L - std::min(p.hy / grid.L, 0.5)))};
+        return {static_cast<int>(std::floor((p.x - grid.ox) / grid.L - std::min(p.hx / grid.L, 0.5) + 1e-9)),
+                static_cast<int>(std::floor((p.y - grid.oy) / grid.L - std::min(p.hy / grid.L, 0.5) + 1e-9))};
     }
     Vec2 velocity_of(const Key& k) const
     {
@@ -386,18 +387,18 @@ struct RefLpfdm
                 now[k] = total > 0 ? Vec2{p[0] / total, p[1] / total} : Vec2{0, 0};
             }
             v = now;
-            gradients(cells, dt);
+            gradients(cells, last_dt);
             const std::map<Key, Vec2> u = v;
             if (two_sided)
             {
                 find_faces(cells, m);
-                convect_half(cells, m, dt, arrival);
+                convect_half(cells, m, last_dt, arrival);
             }
             for (auto& [k, w] : v)
             {
                 if (two_sided)
                     break;
-                const double cx = u.at(k)[0] * dt / L, cy = u.at(k)[1] * dt / L;
+                const double cx = u.at(k)[0] * last_dt / L, cy = u.at(k)[1] * last_dt / L;
                 Gradient<> g{};
                 double total = 0;
                 for (int dj = -1; dj <= 0; ++dj)
@@ -435,7 +436,7 @@ struct RefLpfdm
         }
         for (auto& [k, w] : v)
             for (int d = 0; d < 2; ++d)
-                w[d] += (F[k][d] / m[k] + gravity[d]) * (first ? 0.5 : 1.0) * dt;
+                w[d] += (F[k][d] / m[k] + gravity[d]) * 0.5 * (last_dt + dt);
         if (two_sided)
         {
             if (first)
@@ -443,6 +444,7 @@ struct RefLpfdm
             convect_half(cells, m, dt, false);
         }
         first = false;
+        last_dt = dt;
         old_mass = m;
         gradients(cells, dt);
         for (RefPoint& p : points)

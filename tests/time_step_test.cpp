@@ -65,7 +65,7 @@ velocity = ["1e-12*sin(12.9898*X+78.233*Y+X*Y)", "1e-12*sin(39.425*X-11.135*Y+2*
 };
 
 /// Whether the velocity grows by five orders within these steps: neutral modes grow linearly at most.
-bool is_unstable(const Scene& scene, double dt, int steps = 3000)
+bool is_unstable(const Scene& scene, double dt, int steps = 2000)
 {
     const std::unique_ptr<Solver> solver = make(scene);
     const auto speed = [&]
@@ -157,11 +157,11 @@ TEST(SharpLimit, OfCellContent)
 {
     for (const double xi : {1e-2, 1e-4, 1e-6})
     {
-        const Case single{"mpm-linear", 0.0, 1, 1, {"mpm.scheme=usl"}, 0.5 + xi};
+        const Case single{"mpm-linear", 0.0, 1, 1, {"mpm.scheme=usl", "mpm.mass_cutoff=0.0"}, 0.5 + xi};
         EXPECT_NEAR(*make(single.scene())->sharp_step_limit(), std::sqrt(2 * xi * (1 - xi)), 2e-4 * std::sqrt(2 * xi));
         expect_sharp(single);
-        expect_sharp({"mpm-linear", 0.3, 2, 2, {"mpm.scheme=usl"}, 0.25 + xi});
-        const Case remapped{"mpm-linear", 0.3, 2, 2, {}, 0.25 + xi};
+        expect_sharp({"mpm-linear", 0.3, 2, 2, {"mpm.scheme=usl", "mpm.mass_cutoff=0.0"}, 0.25 + xi});
+        const Case remapped{"mpm-linear", 0.3, 2, 2, {"mpm.mass_cutoff=0.0"}, 0.25 + xi};
         EXPECT_GT(*make(remapped.scene())->sharp_step_limit(), 1.2);
         expect_sharp(remapped);
     }
@@ -176,7 +176,7 @@ TEST(SharpLimit, OfDampingHourglassStiffnessAndSupports)
             EXPECT_NEAR(*make(damped.scene())->sharp_step_limit() * std::sqrt(1 + alpha), *make(plain.scene())->sharp_step_limit(), 1e-9);
             const double limit = *make(damped.scene())->sharp_step_limit();
             EXPECT_FALSE(is_unstable(damped.scene(), 0.97 * limit)) << damped.name();
-            EXPECT_TRUE(is_unstable(damped.scene(), (method == "lpfdm-2000" ? 1.25 : 1.05) * limit)) << damped.name();
+            EXPECT_TRUE(is_unstable(damped.scene(), 1.05 * limit)) << damped.name();
         }
     for (const double chi : {0.0, 0.3, 0.5})
         for (const int cells : {1, 4})
@@ -211,8 +211,10 @@ TEST(SafeLimit, IsBelowTheSharpOne)
                                                                         : 1.42;
                         EXPECT_LT(ratio({method, nu, cells, n, {}, offset}), most) << nu << " " << n << " " << cells << " " << offset;
                         if (method.starts_with("mpm"))
-                            EXPECT_LT(ratio({method, nu, cells, n, {"mpm.scheme=usl"}, offset}), 1.5)
+                        {
+                            EXPECT_LT(ratio({method, nu, cells, n, {"mpm.scheme=usl"}, offset}), 1.75)
                                 << method << " " << nu << " " << n << " " << cells << " " << offset;
+                        }
                     }
     for (const auto& method : particle_methods)
         for (const double offset : {0.0, 0.25, 0.4999, 0.5001})
@@ -408,8 +410,14 @@ TEST(AutoStep, FollowsTheContentOfCells)
 
 namespace
 {
-/// A soft block under its weight that stands on a rigid base, with a stiff body in it: on the base, or floating.
-std::string block_with_inclusion(double contrast, bool on_base)
+struct Box
+{
+    double x0, y0, x1, y1;
+};
+constexpr Box footing{2, 0, 4, 2}, layer{0, 0, 6, 2};
+
+/// A soft block under its weight on a rigid base, with a stiff body in it.
+std::string block_with_inclusion(double contrast, const Box& box)
 {
     return fmt::format(R"toml(
 [grid]
@@ -447,8 +455,8 @@ name = "inclusion"
 material = "stiff"
 shape = "box"
 inside = "block"
-min = [2.0, {1}]
-max = [4.0, {2}]
+min = [{1:.1f}, {2:.1f}]
+max = [{3:.1f}, {4:.1f}]
 [[boundary]]
 name = "base"
 where = "y <= 0"
@@ -458,13 +466,13 @@ name = "sides"
 where = "x <= 0 || x >= 6"
 fix = "x"
 )toml",
-                       contrast, on_base ? 0.0 : 2.0, on_base ? 2.0 : 4.0);
+                       contrast, box.x0, box.y0, box.x1, box.y1);
 }
 }  // namespace
 
 TEST(DensityScaling, RaisesMassesNotWeight)
 {
-    const Scene scene = test::load(block_with_inclusion(1e6, true), "lpfdm");
+    const Scene scene = test::load(block_with_inclusion(1e6, footing), "lpfdm");
     const auto solver = make(scene);
     const Points &soft = solver->bodies()[0].points, &stiff = solver->bodies()[1].points;
     EXPECT_DOUBLE_EQ(soft.mass, 0.25);
@@ -489,9 +497,9 @@ struct AtRest
     int steps;
     std::vector<std::array<double, 3>> stress;
 };
-AtRest rest(double contrast, bool on_base, const std::string& method, std::vector<std::string> options = {})
+AtRest rest(double contrast, const Box& box, const std::string& method, std::vector<std::string> options = {})
 {
-    const Scene scene = test::load(block_with_inclusion(contrast, on_base), method, options);
+    const Scene scene = test::load(block_with_inclusion(contrast, box), method, options);
     const auto solver = make(scene);
     AtRest out{run(scene, *solver, [](const auto&) {}), {}};
     for (const Body& body : solver->bodies())
@@ -516,16 +524,17 @@ double difference(const AtRest& a, const AtRest& b)
 }
 }  // namespace
 
-/// The state at rest is that of true masses, and a contrast of 1e6 on the base takes no more steps than none.
+/// A contrast of 1e6 takes no more steps than none, and the state at rest is that of true masses. With LPFDM the stiff body must not be
+/// bent into the hourglass pattern, which its own stiffness does not resist: a layer, not a footing.
 TEST(DensityScaling, ChangesNeitherTheStateAtRestNorTheSteps)
 {
-    for (const std::string method : {"lpfdm", "lpfdm-2000", "mpm-linear", "mpm-cpgimp", "mpm-bspline"})
+    for (const std::string method : {"lpfdm", "lpfdm-2000", "mpm-linear", "mpm-linear-bbar", "mpm-cpgimp", "mpm-bspline"})
     {
-        const int without = rest(1, true, method).steps;
-        const int with = rest(1e6, true, method).steps;
-        RecordProperty(method, fmt::format("{} {}", without, with));
+        const Box box = method.starts_with("lpfdm") ? layer : footing;
+        const int without = rest(1, box, method).steps, with = rest(1e6, box, method).steps;
         EXPECT_LE(with, 1.2 * without) << method;
+        const AtRest scaled = rest(100, box, method), plain = rest(100, box, method, {"time.density_scaling=false"});
+        EXPECT_LT(difference(scaled, plain), 1e-6) << method;
+        EXPECT_LT(scaled.steps, 0.5 * plain.steps) << method;
     }
-    for (const std::string method : {"lpfdm", "lpfdm-2000", "mpm-cpgimp"})
-        EXPECT_LT(difference(rest(100, true, method), rest(100, true, method, {"time.density_scaling=false"})), 1e-6) << method;
 }
