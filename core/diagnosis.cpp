@@ -182,7 +182,7 @@ Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& fac
     if (m.linear && !m.b_bar && nearly_incompressible && oscillation > oscillates)
         return {"locking", "mpm.strain=b_bar"};
     if (largest_volume_ratio(bodies) > grown)
-        return {"tension", m.point_support && scene.lpfdm.volume_cap == 0 ? "lpfdm.volume_cap=4" : ""};
+        return {"tension", m.point_support && scene.lpfdm.volume_cap == 0 ? "lpfdm.volume_cap=2.0" : ""};
     if (m.scheme == "usl")
         return {"sliver", "mpm.scheme=musl"};
     if (mass_of_fastest(*nodes, full_mass(bodies, lattice->cell_size)) < sliver_mass)

@@ -26,6 +26,7 @@ struct Kick
 {
     double work = 0;       ///< sum of f . (v before + v after) / 2 dt: exactly the change of the kinetic energy [J/m]
     Vec2 transport{0, 0};  ///< sum of m (v before + v after) / 2 dt: mass times way [kg]
+    double damping = 0;    ///< what damping took [J/m]
 };
 
 /// Sums K packs over the nodes in use, in a fixed order: term(i, lanes), zero in the lanes that are not in use.

@@ -61,6 +61,8 @@ NodeOps::NodeOps(const Scene& scene, const Lattice& lattice)
 void NodeOps::begin_step(double t, double dt)
 {
     power_ = {};
+    load_x_.clear();
+    load_y_.clear();
     for (std::size_t k = 0; k < walls_.size(); ++k)
     {
         Restraint& own = restraints_[first_wall_ + k];
@@ -89,37 +91,52 @@ void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, double t)
             power_.restraints += r.reaction[k] * r.components[k].velocity;
     if (!damping_)
         return;
-    power_.damping = damping_->apply(nodes);
+    damping_->apply(nodes);
     power_.restraints += driven_.hold_faces(restraints_, nodes);  // what damping puts on the nodes of a face must not move the wall
 }
 
-void NodeOps::add_work(const Kick& kick, double dt, double before, NodalWork& work) const
+double NodeOps::load_power(const Nodes& nodes) const
+{
+    double power = 0;
+    for (const auto n : nodes.active())
+        power += load_x_[n] * nodes.vx[n] + load_y_[n] * nodes.vy[n];
+    return power;
+}
+
+void NodeOps::add_work(const Kick& kick, double loads, double dt, NodalWork& work) const
 {
     work.kick += kick.work;
     work.gravity += gravity_now_[0] * kick.transport[0] + gravity_now_[1] * kick.transport[1];
+    work.damping += kick.damping;
+    work.loads += loads * dt;
     work.restraints += power_.restraints * dt;
-    work.loads += power_.loads * before;
-    work.damping += power_.damping * before;
-    work.hourglass += power_.hourglass * before;
+    work.hourglass += power_.hourglass * dt;
 }
 
 void NodeOps::kick(Nodes& nodes, double dt)
 {
-    add_work(accelerate(nodes, weight_of(nodes), dt), dt, started_ ? dt : 0, work_);
-    started_ = true;
+    const bool loaded = !load_x_.empty();
+    const double before = loaded ? load_power(nodes) : 0;
+    const Kick kick = damping_ ? accelerate(nodes, weight_of(nodes), dt, *damping_) : accelerate(nodes, weight_of(nodes), dt);
+    add_work(kick, loaded ? 0.5 * (before + load_power(nodes)) : 0, dt, work_);
 }
 
 NodalWork NodeOps::work(const Nodes& nodes, double lag) const
 {
     const std::vector<double>& mass = weight_of(nodes);
-    const auto momentum = sum_over_nodes<2>(nodes,
-                                            [&](std::size_t i, const auto& lanes)
-                                            {
-                                                const Pack m = lanes.load(&mass[i]);
-                                                return std::array{m * lanes.load(&nodes.vx[i]), m * lanes.load(&nodes.vy[i])};
-                                            });
+    const auto s = sum_over_nodes<3>(nodes,
+                                     [&](std::size_t i, const auto& lanes)
+                                     {
+                                         const Pack m = lanes.load(&mass[i]);
+                                         const Pack vx = lanes.load(&nodes.vx[i]), vy = lanes.load(&nodes.vy[i]);
+                                         Pack taken(0.0);
+                                         if (damping_)
+                                             taken = damping_->taken(lanes.load(&nodes.fx[i]), vx) * vx +
+                                                     damping_->taken(lanes.load(&nodes.fy[i]), vy) * vy;
+                                         return std::array{m * vx, m * vy, taken};
+                                     });
     NodalWork now = work_;
-    add_work({lag * nodal_power(nodes), {lag * momentum[0], lag * momentum[1]}}, lag, 2 * lag, now);
+    add_work({lag * nodal_power(nodes), {lag * s[0], lag * s[1]}, lag * s[2]}, load_x_.empty() ? 0 : load_power(nodes), lag, now);
     return now;
 }
 

@@ -46,40 +46,52 @@ inline Gravity make_gravity(const GravitySpec& spec)
     return {spec.acceleration, spec.ramp, spec.profile == "linear"};
 }
 
-/// Eq. (15), local non-viscous damping: F -= alpha |F| sgn(v).
+/// Eq. (15), local non-viscous damping: F -= alpha |F| sgn(v), alpha in [0, 1).
 struct LocalDamping
 {
     double alpha;
 
-    Pack resistance(Pack force, Pack velocity) const
+    Pack damped(Pack force, Pack velocity) const { return force - along(Pack(alpha) * max(force, -force), velocity); }
+    /// What was taken from the force that is left.
+    Pack taken(Pack left, Pack velocity) const
     {
-        Pack size = Pack(alpha) * max(force, -force);
+        Pack share(alpha / (1 + alpha));  // the force was against the motion
+        stdx::where(left * velocity > Pack(0.0), share) = Pack(alpha / (1 - alpha));
+        return along(share * max(left, -left), velocity);
+    }
+    void apply(Nodes& nodes) const
+    {
+        nodes.for_each(
+            [&](std::size_t i, const auto& lanes)
+            {
+                lanes.store(&nodes.fx[i], damped(lanes.load(&nodes.fx[i]), lanes.load(&nodes.vx[i])));
+                lanes.store(&nodes.fy[i], damped(lanes.load(&nodes.fy[i]), lanes.load(&nodes.vy[i])));
+            });
+    }
+
+private:
+    /// A size with the sign of the velocity, zero at rest.
+    static Pack along(Pack size, Pack velocity)
+    {
         stdx::where(velocity == Pack(0.0), size) = Pack(0.0);
         stdx::where(velocity < Pack(0.0), size) = -size;
         return size;
     }
-    Pack damped(Pack force, Pack velocity) const { return force - resistance(force, velocity); }
-    /// Returns the power that it takes from the motion, at the velocity before the kick [W/m].
-    double apply(Nodes& nodes) const
-    {
-        return sum_over_nodes<1>(nodes,
-                                 [&](std::size_t i, const auto& lanes)
-                                 {
-                                     const Pack fx = lanes.load(&nodes.fx[i]), fy = lanes.load(&nodes.fy[i]);
-                                     const Pack vx = lanes.load(&nodes.vx[i]), vy = lanes.load(&nodes.vy[i]);
-                                     const Pack rx = resistance(fx, vx), ry = resistance(fy, vy);
-                                     lanes.store(&nodes.fx[i], fx - rx);
-                                     lanes.store(&nodes.fy[i], fy - ry);
-                                     return std::array{rx * vx + ry * vy};
-                                 })[0];
-    }
 };
 
-/// Eqs. (12), (14): v += F / m dt. Returns the work of the forces. @param weight: mass of the nodes, that has weight
-inline Kick accelerate(Nodes& nodes, const std::vector<double>& weight, double dt)
+/// None: accelerate() then has nothing to add up for it.
+struct NoDamping
+{
+    static Pack taken(Pack, Pack) { return Pack(0.0); }
+};
+
+/// Eqs. (12), (14): v += F / m dt. Returns the work of the forces, exact to rounding, with the velocity in the middle of the kick.
+/// @param weight mass of the nodes, that has weight @param damping that the forces have gone through
+template <class Damping = NoDamping>
+Kick accelerate(Nodes& nodes, const std::vector<double>& weight, double dt, const Damping& damping = {})
 {
     const Pack half(0.5);
-    const auto s = sum_over_nodes<3>(nodes,
+    const auto s = sum_over_nodes<4>(nodes,
                                      [&](std::size_t i, const auto& lanes)
                                      {
                                          const Pack step = inverse_mass(nodes, i, lanes) * Pack(dt), m = lanes.load(&nodes.mass[i]);
@@ -90,9 +102,10 @@ inline Kick accelerate(Nodes& nodes, const std::vector<double>& weight, double d
                                          lanes.store(&nodes.vy[i], vy + dy);
                                          const Pack mean_x = vx + half * dx, mean_y = vy + half * dy;
                                          const Pack w = lanes.load(&weight[i]);
-                                         return std::array{m * (dx * mean_x + dy * mean_y), w * mean_x, w * mean_y};
+                                         return std::array{m * (dx * mean_x + dy * mean_y), w * mean_x, w * mean_y,
+                                                           damping.taken(fx, vx) * mean_x + damping.taken(fy, vy) * mean_y};
                                      });
-    return {s[0], {dt * s[1], dt * s[2]}};
+    return {s[0], {dt * s[1], dt * s[2]}, dt * s[3]};
 }
 
 /// What is recorded of a support or a wall.
@@ -128,15 +141,22 @@ public:
         if (const double work = driven_.drive(restraints_, nodes, vx, vy); counts)
             work_.restraints += work;
     }
-    /// Runs load(), which adds forces of the outside, and notes their power.
+    /// Runs load(), which adds forces of the outside, and keeps them for their work.
     template <class Load>
     void apply_load(const Nodes& nodes, Load&& load)
     {
-        power_.loads -= nodal_power(nodes);
+        before_x_ = nodes.fx;
+        before_y_ = nodes.fy;
+        load_x_.resize(nodes.fx.size());
+        load_y_.resize(nodes.fy.size());
         load();
-        power_.loads += nodal_power(nodes);
+        for (const auto n : nodes.active())
+        {
+            load_x_[n] += nodes.fx[n] - before_x_[n];
+            load_y_[n] += nodes.fy[n] - before_y_[n];
+        }
     }
-    /// Power that hourglass control takes from the motion in the coming step [W/m].
+    /// Power that hourglass control takes from the motion in the coming kick [W/m].
     void note_hourglass(double power) { power_.hourglass = power; }
     /// Accelerates, and adds up the work of all forces.
     void kick(Nodes& nodes, double dt);
@@ -157,8 +177,9 @@ public:
 
 private:
     const std::vector<double>& weight_of(const Nodes& nodes) const { return weight_ ? *weight_ : nodes.mass; }
-    /// @param before the step in the middle of which the nodes' velocity was, as long as the powers hold
-    void add_work(const Kick& kick, double dt, double before, NodalWork& work) const;
+    /// Power of the loads at the present velocity [W/m].
+    double load_power(const Nodes& nodes) const;
+    void add_work(const Kick& kick, double loads, double dt, NodalWork& work) const;
     void find_driven(const Lattice& lattice, const Nodes& nodes)
     {
         if (nodes.version() == seen_)
@@ -176,8 +197,8 @@ private:
     DrivenNodes driven_;
     NodalWork work_, power_;  ///< power: of the coming step, where it is not known to the kick [W/m]
     Vec2 gravity_now_{0, 0};
-    bool started_ = false;  ///< the velocity is no longer that of t = 0
-    std::size_t seen_ = 0;  ///< version of the nodes for which driven_ was found; 0: none
+    std::vector<double> load_x_, load_y_, before_x_, before_y_;  ///< empty in a scene without loads
+    std::size_t seen_ = 0;                                       ///< version of the nodes for which driven_ was found; 0: none
 };
 
 inline double force_norm(const Nodes& nodes)

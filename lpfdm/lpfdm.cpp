@@ -78,7 +78,12 @@ public:
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         if (options_.hourglass > 0)
-            timer_("hourglass", [&] { node_ops_.note_hourglass(resist_hourglass(grid_, hourglass_rate(), hourglass_x_, hourglass_y_)); });
+            timer_("hourglass",
+                   [&]
+                   {
+                       const double power = resist_hourglass(grid_, hourglass_rate(), hourglass_x_, hourglass_y_);
+                       node_ops_.note_hourglass((1 - 2 * hourglass_rate() * step.kick()) * power);  // half of the decay is then done
+                   });
         internal_ = force_norm(nodes_);
         timer_("node operations (11)(15)",
                [&]
