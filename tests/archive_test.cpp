@@ -69,7 +69,7 @@ void expect_same_bits(const std::string& text, const StateCase& c, double dt, in
 std::string pressed_block(const std::string& motion)
 {
     return test::soil_block({0.5, 0.5}, {2.5, 2.5},
-                            test::strength + "[material.softening]\nkind = \"linear\"\nresidual = 0.5\nstrain = 0.02\n") +
+                            test::strength + "[material.softening]\nkind = \"linear\"\nresidual = 0.5\nstrain = 0.5\n") +
            "[gravity]\nacceleration = [0, -9.8]\n[[boundary]]\nname = \"floor\"\nwhere = \"y <= 0.5\"\nfix = \"xy\"\n"
            "[[wall]]\nname = \"cap\"\nmin = [0.0, 2.5]\nmax = [3.0, 3.5]\nvelocity = [0, \"-1.2*t\"]\ndoor = [1.0, 2.0]\n"
            "door_opens = 0.9\nmotion = \"" +
@@ -108,21 +108,21 @@ TEST_P(StateOf, EachPartMatters)
 {
     const Scene scene = test::load(pressed_block("smooth"), GetParam().method, GetParam().overrides);
     const auto solver = make(scene);
-    for (int n = 0; n < 300; ++n)
+    for (int n = 0; n < 500; ++n)
         step(*solver, n, 1.5e-3);
     const State start = state_of(*solver);
     const auto after = [&](const State& state)
     {
         restore(*solver, state);
-        for (int n = 300; n < 303; ++n)
+        for (int n = 500; n < 503; ++n)
             step(*solver, n, 1.5e-3);
         return state_of(*solver);
     };
     const State reference = after(start);
     std::size_t tried = 0;
     for (const char* name :
-         {"body/soil/x", "body/soil/y", "body/soil/stress_xx", "body/soil/stress_yy", "body/soil/stress_xy", "body/soil/stress_zz",
-          "body/soil/volume", "body/soil/half_width_x", "body/soil/half_width_y", "body/soil/velocity_x", "body/soil/velocity_y",
+         {"body/soil/x", "body/soil/y", "body/soil/stress_xx", "body/soil/stress_yy", "body/soil/stress_xy", "body/soil/volume",
+          "body/soil/half_width_x", "body/soil/half_width_y", "body/soil/velocity_x", "body/soil/velocity_y",
           "body/soil/plastic_shear_strain", "node/velocity_x", "node/velocity_y", "wall/cap/travel"})
     {
         State changed = start;
