@@ -92,7 +92,7 @@ Measurement measure(const std::string& method, const std::string& law, double po
     m.law = law;
     m.team = team;
     m.setup = setup.seconds();
-    const double dt = time_step(scene);
+    const double dt = time_step(scene, *solver);
     std::size_t step = 0;
     const auto advance = [&](std::size_t steps)
     {

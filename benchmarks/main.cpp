@@ -8,6 +8,7 @@
 #include "core/results.hpp"
 #include "core/run.hpp"
 #include "core/run_options.hpp"
+#include "core/step_control.hpp"
 #include "lpfdm/lpfdm.hpp"
 #include "mpm/mpm.hpp"
 
@@ -90,7 +91,7 @@ void try_first_sample(const Scene& scene, Solver& solver)
 {
     try
     {
-        solver.prepare(0, time_step(scene));
+        solver.prepare(0, time_step(scene, solver));
         solver.update_points();
         Observer(scene, solver).sample(0, time_step(scene));
     }
@@ -118,18 +119,26 @@ void check(const RunOptions& options, bool resolved)
         fmt::print("material {:<7} {}, M = {:.5g} Pa, c_p = {:.5g} m/s, c_s = {:.5g} m/s\n", m.name, m.law, moduli.constrained(),
                    std::sqrt(moduli.constrained() / m.density), std::sqrt(moduli.shear() / m.density));
     }
-    fmt::print("time step        {:.5g} s, critical {:.5g} s, {:.0f} steps\n", time_step(scene), critical_time_step(scene),
-               std::ceil(scene.time.end / time_step(scene)));
     std::size_t points = 0;
     for (const BodySpec& body : scene.bodies)
         points += fill(scene, body).size();
     fmt::print("points           {}\n", points);
     if (is_fem)
     {
+        fmt::print("time step        {:.5g} s, critical {:.5g} s, {:.0f} steps\n", time_step(scene), critical_time_step(scene),
+                   std::ceil(scene.time.end / time_step(scene)));
         fmt::print("the FEM reference samples its solution at these points; it keeps no particle fields\n");
         return;
     }
     const std::unique_ptr<Solver> solver = make_particle_solver(scene);
+    if (const std::string warning = step_warning(scene, *solver); !warning.empty())
+        warn(options, warning);
+    const double dt = time_step(scene, *solver);
+    fmt::print("time step        {:.5g} s{}, {}{:.0f} steps\nlimits           {}\n", dt,
+               scene.time.follows_limit ? " at the start, then as the limit lets it" : "", scene.time.follows_limit ? "about " : "",
+               std::ceil(scene.time.end / dt), description(solver->step_limits()));
+    if (const auto sharp = solver->sharp_step_limit())
+        fmt::print("sharp limit      {:.5g} s of stiffness, for the points as they stand at the start\n", *sharp);
     try_first_sample(scene, *solver);
     fmt::print("cells in use     {}\nunknowns         {}\n{}", solver->active_cells(), solver->unknowns(),
                fields_and_modules(scene, *solver));

@@ -1,5 +1,6 @@
 #include "core/body.hpp"
 
+#include "core/density_scaling.hpp"
 #include "core/geometry.hpp"
 #include "core/make_material.hpp"
 #include "core/random_field.hpp"
@@ -184,6 +185,8 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
         if (spec.initial_stress)
             set_initial_stress(*spec.initial_stress, constants, q);
     }
+    if (scene.time.density_scaling)
+        scale_densities(bodies);
     return bodies;
 }
 }  // namespace testbed

@@ -25,8 +25,8 @@ public:
             for (std::size_t p = 0; p < q.count; ++p)
             {
                 const Vec2 b = acceleration_({q.X[p], q.Y[p], q.x[p], q.y[p], t});
-                bx_[p] = q.mass * b[0];
-                by_[p] = q.mass * b[1];
+                bx_[p] = q.mass * q.weight_share * b[0];
+                by_[p] = q.mass * q.weight_share * b[1];
             }
             spread<Support, 2>(lattice, body, first_bin, partial_,
                                [&](std::size_t p, const auto& lanes) {

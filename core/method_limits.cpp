@@ -31,7 +31,7 @@ double critical_time_step(const Scene& scene)
         const MaterialSpec& m = scene.material(body.material);
         const ElasticModuli moduli(largest_youngs_modulus(scene, m), m.poissons_ratio);
         const double wave_speed = std::sqrt(moduli.constrained() / m.density);
-        const double isolated = std::sqrt(std::min(1.0, 1 - m.poissons_ratio));
+        const double nu = m.poissons_ratio, isolated = std::sqrt(nu < 0 ? (1 - nu) / (1 - 2 * nu) : 1 - nu);
         limit = std::min(limit, scene.grid.cell_size / wave_speed * isolated);
     }
     return limit / std::sqrt(1 + (scene.damping ? scene.damping->local : 0));
@@ -41,4 +41,5 @@ double time_step(const Scene& scene)
 {
     return scene.time.dt ? *scene.time.dt : scene.time.cfl * critical_time_step(scene);
 }
+
 }  // namespace testbed

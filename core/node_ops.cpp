@@ -78,7 +78,7 @@ void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, double t)
 {
     if (gravity_)
     {
-        gravity_->apply(nodes, t);
+        gravity_->apply(nodes, weight_of(nodes), t);
         const double factor = gravity_->factor(t);
         gravity_now_ = {factor * gravity_->acceleration[0], factor * gravity_->acceleration[1]};
     }
@@ -105,16 +105,17 @@ void NodeOps::add_work(const Kick& kick, double dt, double before, NodalWork& wo
 
 void NodeOps::kick(Nodes& nodes, double dt)
 {
-    add_work(accelerate(nodes, dt), dt, started_ ? dt : 0, work_);
+    add_work(accelerate(nodes, weight_of(nodes), dt), dt, started_ ? dt : 0, work_);
     started_ = true;
 }
 
 NodalWork NodeOps::work(const Nodes& nodes, double lag) const
 {
+    const std::vector<double>& mass = weight_of(nodes);
     const auto momentum = sum_over_nodes<2>(nodes,
                                             [&](std::size_t i, const auto& lanes)
                                             {
-                                                const Pack m = lanes.load(&nodes.mass[i]);
+                                                const Pack m = lanes.load(&mass[i]);
                                                 return std::array{m * lanes.load(&nodes.vx[i]), m * lanes.load(&nodes.vy[i])};
                                             });
     NodalWork now = work_;

@@ -26,13 +26,15 @@ struct Gravity
         return linear ? t / ramp : 0.5 * (1 - std::cos(std::numbers::pi * t / ramp));
     }
 
-    void apply(Nodes& nodes, double t) const
+    void apply(Nodes& nodes, double t) const { apply(nodes, nodes.mass, t); }
+    /// @param mass of the nodes, that has weight
+    void apply(Nodes& nodes, const std::vector<double>& mass, double t) const
     {
         const Pack gx(factor(t) * acceleration[0]), gy(factor(t) * acceleration[1]);
         nodes.for_each(
             [&](std::size_t i, const auto& lanes)
             {
-                const Pack m = lanes.load(&nodes.mass[i]);
+                const Pack m = lanes.load(&mass[i]);
                 lanes.store(&nodes.fx[i], lanes.load(&nodes.fx[i]) + gx * m);
                 lanes.store(&nodes.fy[i], lanes.load(&nodes.fy[i]) + gy * m);
             });
@@ -73,8 +75,8 @@ struct LocalDamping
     }
 };
 
-/// Eqs. (12), (14): v += F / m dt. Returns the work of the forces.
-inline Kick accelerate(Nodes& nodes, double dt)
+/// Eqs. (12), (14): v += F / m dt. Returns the work of the forces. @param weight: mass of the nodes, that has weight
+inline Kick accelerate(Nodes& nodes, const std::vector<double>& weight, double dt)
 {
     const Pack half(0.5);
     const auto s = sum_over_nodes<3>(nodes,
@@ -87,7 +89,8 @@ inline Kick accelerate(Nodes& nodes, double dt)
                                          lanes.store(&nodes.vx[i], vx + dx);
                                          lanes.store(&nodes.vy[i], vy + dy);
                                          const Pack mean_x = vx + half * dx, mean_y = vy + half * dy;
-                                         return std::array{m * (dx * mean_x + dy * mean_y), m * mean_x, m * mean_y};
+                                         const Pack w = lanes.load(&weight[i]);
+                                         return std::array{m * (dx * mean_x + dy * mean_y), w * mean_x, w * mean_y};
                                      });
     return {s[0], {dt * s[1], dt * s[2]}};
 }
@@ -106,6 +109,8 @@ public:
     /// @throws SceneError when a boundary takes no node
     NodeOps(const Scene& scene, const Lattice& lattice);
 
+    /// Gravity takes these masses of the nodes for those that have weight, from now on.
+    void weigh_with(const std::vector<double>& mass) { weight_ = &mass; }
     /// Takes the walls to time t, and to their velocity in the coming step.
     /// @throws Diverged when a wall has left the lattice or has reached what stands in its way
     void begin_step(double t, double dt);
@@ -151,6 +156,7 @@ public:
     const std::vector<Restraint>& restraints() const { return restraints_; }
 
 private:
+    const std::vector<double>& weight_of(const Nodes& nodes) const { return weight_ ? *weight_ : nodes.mass; }
     /// @param before the step in the middle of which the nodes' velocity was, as long as the powers hold
     void add_work(const Kick& kick, double dt, double before, NodalWork& work) const;
     void find_driven(const Lattice& lattice, const Nodes& nodes)
@@ -162,6 +168,7 @@ private:
     }
 
     std::optional<Gravity> gravity_;
+    const std::vector<double>* weight_ = nullptr;  ///< null: all mass has weight
     std::optional<LocalDamping> damping_;
     std::vector<Restraint> restraints_;  ///< of the boundaries, then of the walls: where two prescribe, the later one does
     std::vector<Wall> walls_;

@@ -261,7 +261,7 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     write("stress", "Pa", 6, [&](At at, Here) { return stress(at); });
     write("volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).current_volume(at.point)}; });
     write("initial_volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).initial_volume}; });
-    write("mass", "kg/m", 1, [&](At at, Here) { return Row1{points(at).mass}; });
+    write("mass", "kg/m", 1, [&](At at, Here) { return Row1{points(at).mass * points(at).weight_share}; });
     const auto any_active = [&](const Field<double> Points::*field)
     {
         const auto& bodies = solver_.bodies();

@@ -201,6 +201,7 @@ OneStepMap one_step_map(Solver& solver, const State& about, const Lattice& latti
     const auto after = [&](const State& start)
     {
         restore(solver, start);
+        solver.assume_last_step(settings.dt);
         for (int k = 0; k < settings.steps; ++k)
         {
             solver.prepare(settings.t + k * settings.dt, settings.dt);

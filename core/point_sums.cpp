@@ -44,16 +44,16 @@ PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice)
     {
         const Points& q = body.points;
         const ElasticModuli base = moduli(body.material);
-        const double initial = 1 / q.initial_volume;
+        const double initial = 1 / q.initial_volume, mass = q.mass * q.weight_share;
         const auto s = ordered_sum<6>(q.count,
                                       [&](std::size_t p)
                                       {
                                           const double volume = q.current_volume(p), energy = energy_of(q, base, p);
                                           const bool inside =
                                               q.x[p] >= low[0] && q.x[p] <= high[0] && q.y[p] >= low[1] && q.y[p] <= high[1];
-                                          return std::array<double, 6>{energy,          energy * work_over_energy(volume * initial),
-                                                                       volume,          q.mass * q.x[p],
-                                                                       q.mass * q.y[p], inside ? 0.0 : 1.0};
+                                          return std::array<double, 6>{energy,        energy * work_over_energy(volume * initial),
+                                                                       volume,        mass * q.x[p],
+                                                                       mass * q.y[p], inside ? 0.0 : 1.0};
                                       });
         total.strain_energy += s[0];
         total.elastic_work += s[1];

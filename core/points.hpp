@@ -22,7 +22,8 @@ struct Points
     Field<std::uint32_t> id{"id", "-"};
 
     std::size_t count = 0;
-    double mass = 0;            ///< of one point [kg/m]
+    double mass = 0;            ///< of one point, that resists acceleration [kg/m]
+    double weight_share = 1;    ///< the part of it that has weight; less than one with density scaling
     double initial_volume = 0;  ///< of one point [m^2]
 
     /// The one list that reordering, output and accounting walk: f(field) for every active field.

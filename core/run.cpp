@@ -6,6 +6,7 @@
 #include "core/observer.hpp"
 #include "core/provenance.hpp"
 #include "core/scene_trial.hpp"
+#include "core/step_control.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -60,7 +61,7 @@ struct Outcome
     std::string status = "completed", reason;
     ExitCode code = ExitCode::completed;
     std::int64_t steps = 0;
-    double solve_seconds = 0, output_seconds = 0, guard_seconds = 0, dt = 0;
+    double solve_seconds = 0, output_seconds = 0, guard_seconds = 0;
     std::vector<Finding> findings;
     std::string note;
     Diagnosis diagnosis;
@@ -71,27 +72,21 @@ struct Outcome
 };
 
 /// Steps from 0 to the end; the history and the snapshots go to the observer.
-Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, ResultFile& file, bool quiet)
+Outcome step_through(const Scene& scene, Solver& solver, StepControl& clock, Observer& observer, ResultFile& file, bool quiet)
 {
     const Stopwatch watch;
     Outcome out;
     const double end = scene.time.end;
-    out.dt = solver.is_static() ? end : scene.time.dt ? *scene.time.dt : scene.time.cfl * solver.critical_time_step(scene);
-    if (!(end / out.dt < 1e12))
-        throw SceneError(fmt::format("{}: time.end = {:.4g} s takes more than 1e12 steps of {:.4g} s", scene.path, end, out.dt));
-    const auto total_steps = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(end / out.dt * (1 - 1e-12))));
-    if (!scene.time.dt)
-        out.dt = end / static_cast<double>(total_steps);
     const double history_interval = scene.output.history > 0 ? scene.output.history : end / 200;
     const double snapshot_interval = scene.output.snapshots > 0 ? end / scene.output.snapshots : 2 * end;
-    const double half = 0.5 * out.dt, critical = solver.critical_time_step(scene);
-    Guards guards(scene, solver, critical);
+    Guards guards(scene, solver, clock.follows_limit() ? std::numeric_limits<double>::infinity() : clock.critical());
     double next_sample = 0, next_snapshot = 0, t = 0;
     std::int64_t looked_at = 0;
     Progress progress(!quiet, end);
     const auto record = [&](bool last)
     {
         const Stopwatch output;
+        const double half = 0.5 * clock.dt();
         const bool sample = t + half >= next_sample || last, snapshot = t + half >= next_snapshot || last;
         if (sample || snapshot)
             solver.update_points();
@@ -100,7 +95,7 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
             constexpr std::int64_t steps_between = 50;  // so that looking at all points costs little beside the steps
             const bool fresh = last || out.steps == 0 || out.steps >= looked_at + steps_between;
             looked_at = fresh ? out.steps : looked_at;
-            const GuardSample& now = observer.sample(t, out.dt, fresh);
+            const GuardSample& now = observer.sample(t, clock.dt(), fresh);
             const Stopwatch watching;
             guards.watch(now, solver);
             out.guard_seconds += watching.seconds();
@@ -124,12 +119,12 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
     {
         for (;; ++out.steps)
         {
-            t = static_cast<double>(out.steps) * out.dt;
-            solver.prepare(t, out.dt);
+            t = clock.t();
+            solver.prepare(t, clock.dt());
             const bool now_and_then = out.steps % 50 == 0;
             const bool limit = scene.time.wall_clock_limit && now_and_then && watch.seconds() > *scene.time.wall_clock_limit;
             const bool rest = scene.time.stop_unbalanced && out.steps > 0 && now_and_then && is_at_rest();
-            const bool last = out.steps >= total_steps || interrupted || limit || rest;
+            const bool last = clock.is_at_end() || interrupted || limit || rest;
             record(last);
             if (interrupted)
                 out.status = "interrupted", out.code = ExitCode::interrupted,
@@ -138,8 +133,9 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
                 out.status = "time_limit", out.code = ExitCode::time_limit, out.reason = fmt::format("wall clock limit at t = {:.6g} s", t);
             if (last)
                 break;
-            solver.advance(out.dt);
+            solver.advance(clock.dt());
             progress.show(t, out.steps);
+            clock.next();
         }
     }
     catch (const std::runtime_error& e)  // Diverged, or an expression of t that ceases to be finite
@@ -157,7 +153,7 @@ Outcome step_through(const Scene& scene, Solver& solver, Observer& observer, Res
     out.findings = guards.findings(out.completed());
     out.note = guards.note();
     if (!out.sound())
-        out.diagnosis = diagnose(scene, solver, {out.dt, critical, out.findings});
+        out.diagnosis = diagnose(scene, solver, {clock.dt(), clock.critical(), out.findings});
     return out;
 }
 
@@ -268,7 +264,7 @@ void tell_findings(const Outcome& out)
                    out.diagnosis.remedy);
 }
 
-void write_performance(ResultFile& file, const Scene& scene, Solver& solver, const Observer& observer, const Outcome& out,
+void write_performance(ResultFile& file, Solver& solver, const StepControl& clock, const Observer& observer, const Outcome& out,
                        double setup_seconds, std::size_t points)
 {
     const std::string group = "/performance";
@@ -284,8 +280,10 @@ void write_performance(ResultFile& file, const Scene& scene, Solver& solver, con
     file.attribute(group, "bytes_per_point", static_cast<double>(solver.bytes()) / static_cast<double>(points));
     file.attribute(group, "cells", static_cast<std::int64_t>(solver.active_cells()));
     file.attribute(group, "dofs", static_cast<std::int64_t>(solver.unknowns()));
-    file.attribute(group, "dt", out.dt);
-    file.attribute(group, "dt_critical", solver.critical_time_step(scene));
+    file.attribute(group, "dt", clock.dt());
+    file.attribute(group, "dt_shortest", clock.shortest());
+    file.attribute(group, "dt_longest", clock.longest());
+    file.attribute(group, "dt_critical", clock.critical());
     for (const auto& [phase, seconds] : solver.timer().phases())
         file.attribute(group + "/phases", phase, seconds);
 }
@@ -302,6 +300,12 @@ Scene load_and_warn(const RunOptions& options)
     return std::move(loaded.scene);
 }
 
+void warn(const RunOptions& options, const std::string& warning)
+{
+    if (options.strict)
+        throw SceneError(warning);
+    fmt::print(stderr, "warning: {}\n", warning);
+}
 int guarded_main(const std::function<int()>& body)
 {
     const auto fail = [](ExitCode code, const char* message)
@@ -379,7 +383,10 @@ Outcome run_once(const RunOptions& options, const MakeSolver& make_solver)
     const std::string output = options.output.empty() ? default_output(scene) : options.output;
     check_output(output);
     const std::unique_ptr<Solver> solver = make_solver(scene);
+    if (const std::string warning = step_warning(scene, *solver); !warning.empty())
+        warn(options, warning);
     Observer observer(scene, *solver);
+    StepControl clock(scene, *solver);
     std::size_t points = 0;
     for (const Body& body : solver->bodies())
         points += body.points.count;
@@ -399,11 +406,11 @@ Outcome run_once(const RunOptions& options, const MakeSolver& make_solver)
     };
     ResultFile file = open();
     write_header(file, scene, *solver);
-    Outcome out = step_through(scene, *solver, observer, file, options.quiet);
+    Outcome out = step_through(scene, *solver, clock, observer, file, options.quiet);
     if (options.diagnose && !out.diagnosis.remedy.empty() && !interrupted)
         try_remedy(options, make_solver, output, out);
     observer.write_history(file);
-    write_performance(file, scene, *solver, observer, out, setup_seconds, points);
+    write_performance(file, *solver, clock, observer, out, setup_seconds, points);
     write_verdict(file, out);
     file.commit();
     try
@@ -425,7 +432,7 @@ Outcome run_once(const RunOptions& options, const MakeSolver& make_solver)
         fmt::print(stderr,
                    "{} {}: {}; {} points, {} steps of {:.4g} s in {:.3g} s, {:.3g} million particle-steps per second, {:.1f} bytes per "
                    "point; {}\n",
-                   scene.case_name(), variant_label(scene), ending(out), points, out.steps, out.dt, out.solve_seconds,
+                   scene.case_name(), variant_label(scene), ending(out), points, out.steps, clock.dt(), out.solve_seconds,
                    1e-6 * static_cast<double>(points) * static_cast<double>(out.steps) / out.solve_seconds,
                    static_cast<double>(solver->bytes()) / static_cast<double>(points), output);
     else if (out.code != ExitCode::completed)

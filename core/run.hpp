@@ -37,6 +37,9 @@ using MakeSolver = std::function<std::unique_ptr<Solver>(const Scene&)>;
 /// Loads the scene, says its warnings on stderr. @throws SceneError, also for a warning if strict
 Scene load_and_warn(const RunOptions& options);
 
+/// What is found out after loading: on stderr. @throws SceneError if strict
+void warn(const RunOptions& options, const std::string& warning);
+
 /// Runs the scene and writes the result file and its XDMF. Talk goes to stderr.
 /// @throws SceneError before anything is written, OutputError
 ExitCode run_scene(const RunOptions& options, const MakeSolver& make_solver);

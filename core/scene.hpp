@@ -34,13 +34,18 @@ struct TimeSpec
 {
     double end = 0, cfl = 0.5;
     std::optional<double> dt, stop_unbalanced, wall_clock_limit;
+    bool follows_limit = false;  ///< dt = "auto"
+    bool density_scaling = false;
 
     template <class V>
     void describe(V& v)
     {
         v.required("end", end, "s", "the run completes with the first step that reaches this time");
-        v.optional("cfl", cfl, "-", "time step as a share of the critical one");
-        v.optional("dt", dt, "s", "time step; replaces cfl");
+        v.optional("cfl", cfl, "-", "time step as a share of the method's own limit at the start, or with dt = \"auto\" at all times");
+        v.number_or("dt", dt, "auto", follows_limit, "s", "time step, replaces cfl; \"auto\" follows the limit as the state changes");
+        v.optional(
+            "density_scaling", density_scaling, "-",
+            "for damped scenes on their way to rest: masses of stiffer bodies are raised, not their weight, so that all have one limit");
         v.optional(
             "stop_unbalanced", stop_unbalanced, "-",
             "the run completes earlier, when unbalanced over internal nodal forces and kinetic over strain energy are both below this");

@@ -1,5 +1,4 @@
 #include "core/geometry.hpp"
-#include "core/method_limits.hpp"
 #include "core/scene_problems.hpp"
 #include "core/walls.hpp"
 
@@ -360,6 +359,17 @@ void check_traction(const Scene& scene, const TractionSpec& traction, const std:
         problems.add(key + ".body", fmt::format("no box '{}'", traction.body) + suggestion(traction.body, boxes));
 }
 
+/// Masses may be raised only where the way to rest does not matter.
+void check_density_scaling(const Scene& scene, Problems& problems)
+{
+    if (!scene.damping || scene.damping->local <= 0)
+        problems.add("time.density_scaling", "changes every motion: it is for scenes on their way to rest and needs [damping]");
+    for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+        if (scene.bodies[k].velocity)
+            problems.add(fmt::format("body[{}].velocity", k), "an initial velocity and time.density_scaling exclude each other: with other "
+                                                              "masses it is another motion");
+}
+
 /// Nonlocal softening averages over all bodies together: they must agree on how.
 void check_nonlocal(const Scene& scene, Problems& problems)
 {
@@ -414,6 +424,8 @@ void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& proble
     positive(scene.time.cfl, "time.cfl");
     if (scene.time.dt)
         positive(*scene.time.dt, "time.dt");
+    if (scene.time.density_scaling)
+        check_density_scaling(scene, problems);
     if (scene.time.stop_unbalanced)
         positive(*scene.time.stop_unbalanced, "time.stop_unbalanced");
     if (scene.time.wall_clock_limit)
@@ -492,8 +504,6 @@ void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& proble
 
 void check_limits(const Scene& scene, Problems& problems)
 {
-    const double critical = critical_time_step(scene);
-    const double dt = time_step(scene);
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
         if (scene.bodies[k].initial_stress && find_variant(scene.method).family == "fem")
             problems.warn(fmt::format("body[{}].initial_stress", k), "the FEM reference starts without stress: it is left out");
@@ -508,9 +518,6 @@ void check_limits(const Scene& scene, Problems& problems)
         problems.warn("traction",
                       "domains reach into the cells outside a loaded face, and what they hold there may run away; use [confinement] "
                       "for a pressure, or lpfdm.support = \"point\"");
-    if (dt > critical * (1 + 1e-12))
-        problems.warn(scene.time.dt ? "time.dt" : "time.cfl",
-                      fmt::format("the time step {:.4g} s is above the critical one, {:.4g} s", dt, critical));
     const std::string family = find_variant(scene.method).family;
     for (std::size_t k = 0; k < scene.materials.size(); ++k)
     {

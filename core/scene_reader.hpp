@@ -63,6 +63,14 @@ public:
         if (const toml::node* node = find(key))
             read(full(key), *node, value);
     }
+    /// A number, or one word that stands for something else.
+    void number_or(const char* key, std::optional<double>& value, const char* word, bool& is_word, const char* unit, const char* doc)
+    {
+        const toml::node* node = find(key);
+        is_word = node && node->value_exact<std::string>() == word;
+        if (!is_word)
+            optional(key, value, unit, doc);
+    }
     template <class T>
     void required(const char* key, T& value, const char* unit, const char* doc)
     {
@@ -267,6 +275,13 @@ private:
         std::string why;
         if (!number_of(node, value, why))
             problems_.add(path, why);
+    }
+    void read(const std::string& path, const toml::node& node, bool& value)
+    {
+        if (const auto boolean = node.value_exact<bool>())
+            value = *boolean;
+        else
+            problems_.add(path, "true or false is asked, not a " + kind_of(node));
     }
     void read(const std::string& path, const toml::node& node, int& value)
     {

@@ -27,6 +27,10 @@ std::string toml_text(double v)
     std::string text = fmt::format("{}", v);
     return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
 }
+std::string toml_text(bool v)
+{
+    return v ? "true" : "false";
+}
 std::string toml_text(int v)
 {
     return std::to_string(v);
@@ -83,6 +87,13 @@ public:
     {
         if (!value.empty())
             keys_ += fmt::format("{} = {}\n", key, toml_text(value));
+    }
+    void number_or(const char* key, std::optional<double>& value, const char* word, bool& is_word, const char* unit, const char* doc)
+    {
+        if (is_word)
+            keys_ += fmt::format("{} = {}\n", key, in_quotes(word));
+        else
+            optional(key, value, unit, doc);
     }
     template <class T>
     void required(const char* key, T& value, const char* unit, const char* doc)
@@ -158,6 +169,10 @@ public:
     void optional(const char* key, std::optional<T>&, const char* unit, const char* doc)
     {
         line(key, unit, doc, "may be absent");
+    }
+    void number_or(const char* key, std::optional<double>&, const char* word, bool&, const char* unit, const char* doc)
+    {
+        line(key, unit, doc, fmt::format("may be absent, or {}", in_quotes(word)));
     }
     template <class T>
     void required(const char* key, T&, const char* unit, const char* doc)

@@ -6,6 +6,7 @@
 #include "core/method_limits.hpp"
 #include "core/node_ops.hpp"
 #include "core/phase_timer.hpp"
+#include "core/time_step.hpp"
 
 #include <cmath>
 
@@ -89,12 +90,27 @@ class Solver
 public:
     virtual ~Solver() = default;
 
-    /// Forces and accelerations at time t, from the state at t. dt is the coming step [s].
-    virtual void prepare(double t, double dt) = 0;
+    /// Forces and accelerations at time t, from the state at t. dt is the coming step [s]; it may be another one than the last.
+    void prepare(double t, double dt)
+    {
+        step_ = {t, dt, last_dt_};
+        do_prepare(step_);
+    }
     /// Sums at the time of the last prepare().
     virtual MotionSums sums() const = 0;
-    /// The state from t to t + dt. @throws Diverged
-    virtual void advance(double dt) = 0;
+    /// The state from t to t + dt, the step that was prepared. @throws Diverged
+    void advance(double dt)
+    {
+        step_.dt = dt;
+        do_advance(step_);
+        last_dt_ = dt;
+    }
+    /// Takes the last step, if there was one, for one of this length: the map of equal steps about a state that others led to.
+    void assume_last_step(double dt)
+    {
+        if (last_dt_ > 0)
+            last_dt_ = dt;
+    }
 
     /// Brings the points of bodies() to the state of the last prepare(): for methods whose points are samples, not unknowns.
     virtual void update_points() {}
@@ -116,15 +132,39 @@ public:
     /// Supports and walls at the last prepare().
     virtual std::vector<RestraintRecord> restraints() const = 0;
     virtual const char* kinematics() const = 0;  ///< which [exact.*] applies
-    /// What time.cfl is a share of: the stability limit, or for an implicit method what it would be about [s].
-    virtual double critical_time_step(const Scene& scene) { return testbed::critical_time_step(scene); }
+    /// What limits the coming step, in the present state and on the safe side; nothing for an implicit method.
+    virtual std::vector<StepLimit> step_limits() { return {}; }
+    /// The limit of small motions about the present state, without a safe side, from the largest eigenvalue of its own stiffness; takes the
+    /// time of some hundred steps, more memory than the solver itself, and counts no convection [s]. None for an implicit method.
+    virtual std::optional<double> sharp_step_limit() { return std::nullopt; }
+    /// What time.cfl is a share of: the least limit, or for an implicit method what it would be about [s].
+    virtual double critical_time_step(const Scene& scene)
+    {
+        const std::vector<StepLimit> limits = step_limits();
+        return limits.empty() ? testbed::critical_time_step(scene) : governing(limits).seconds;
+    }
     /// What the next prepare() and advance() depend on, beside their arguments; between two steps, so after advance().
     virtual void write_state(StateWriter&) { throw std::logic_error("this method cannot write its state"); }
     /// The steps that follow have the same bits as if nothing had been between.
     virtual void read_state(StateReader&) { throw std::logic_error("this method cannot read its state"); }
     /// One implicit step to the end instead of many explicit ones.
     virtual bool is_static() const { return false; }
+
+protected:
+    double last_dt_ = 0;  ///< of the step that led here; zero at the start [s]
+
+private:
+    virtual void do_prepare(const Step& step) = 0;
+    virtual void do_advance(const Step& step) = 0;
+
+    Step step_{0, 0, 0};
 };
+
+/// The scene's dt, or its cfl times the critical one in the present state [s].
+inline double time_step(const Scene& scene, Solver& solver)
+{
+    return scene.time.dt ? *scene.time.dt : scene.time.cfl * solver.critical_time_step(scene);
+}
 
 inline State state_of(Solver& solver)
 {

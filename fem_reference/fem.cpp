@@ -32,8 +32,9 @@ void FemSolver::assemble_once()
     assembled_ = true;
 }
 
-void FemSolver::prepare(double t, double dt)
+void FemSolver::do_prepare(const Step& step)
 {
+    const auto [t, dt, last_dt] = step;
     assemble_once();
     time_ = t;
     prepare_step(t, dt);
@@ -119,8 +120,9 @@ public:
     }
     bool is_static() const override { return true; }
 
-    void advance(double dt) override
+    void do_advance(const Step& step) override
     {
+        const double dt = step.dt;
         timer_("loads", [&] { load_ = elasticity_.load(time_ + dt); });
         double driving = 0;
         try
@@ -174,8 +176,9 @@ class NewmarkFem final : public FemSolver
 public:
     NewmarkFem(const Scene& scene, const Warn& warn) : FemSolver(scene, warn, MassKind::consistent) {}
 
-    void advance(double dt) override
+    void do_advance(const Step& step) override
     {
+        const double dt = step.dt;
         timer_("predictor",
                [&]
                {
@@ -238,10 +241,10 @@ public:
     CentralDifferenceFem(const Scene& scene, const Warn& warn) : FemSolver(scene, warn, MassKind::lumped) {}
 
     double critical_time_step(const Scene&) override { return stable_time_step(); }
-    void advance(double dt) override
+    void do_advance(const Step& step) override
     {
-        // the given initial velocity is that of t = 0: the first kick is half a step
-        velocity_.add(started_ ? dt : 0.5 * dt, acceleration_);
+        const double dt = step.dt;
+        velocity_.add(step.kick(), acceleration_);
         displacement_.add(dt, velocity_);
         started_ = true;
     }

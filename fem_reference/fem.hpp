@@ -15,7 +15,6 @@ class FemSolver : public Solver
 public:
     FemSolver(const Scene& scene, const Warn& warn, MassKind mass_kind);
 
-    void prepare(double t, double dt) final;
     MotionSums sums() const override;
     void update_points() override;
     const std::vector<Body>& bodies() const override { return bodies_; }
@@ -36,6 +35,7 @@ public:
     double strain_energy() const;
 
 protected:
+    void do_prepare(const Step& step) final;
     void assemble_once();
     /// Acceleration at time t, or what else a step needs.
     virtual void prepare_step(double t, double dt) = 0;

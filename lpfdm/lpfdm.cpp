@@ -1,10 +1,12 @@
 #include "lpfdm/lpfdm.hpp"
 
 #include "core/body_force.hpp"
+#include "core/density_scaling.hpp"
 #include "core/nonlocal.hpp"
 #include "core/tractions.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
+#include "lpfdm/time_step.hpp"
 
 #include <cmath>
 
@@ -33,6 +35,10 @@ public:
             tractions_.emplace(scene);
         if (has_nonlocal_softening(scene))
             nonlocal_.emplace(scene, grid_.lattice.cell_size);
+        if (scene.time.density_scaling)
+            node_ops_.weigh_with(weight_.emplace().nodes);
+        if (scene.damping)
+            damping_ = scene.damping->local;
         for (const Body& body : bodies_)
             wave_speed_ =
                 std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
@@ -45,8 +51,9 @@ public:
         set_initial_velocity(scene);
     }
 
-    void prepare(double t, double dt) override
+    void do_prepare(const Step& step) override
     {
+        const double t = step.t, dt = step.dt;
         node_ops_.begin_step(t, dt);
         timer_("bins",
                [&]
@@ -66,17 +73,12 @@ public:
                [&]
                {
                    extend_to_frontier();
-                   convect_velocity(dt);
+                   convect_velocity(step.last_dt);
                    keep_mass();
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         if (options_.hourglass > 0)
-            timer_("hourglass",
-                   [&]
-                   {
-                       const double rate = options_.hourglass * wave_speed_ / grid_.lattice.cell_size;
-                       node_ops_.note_hourglass(resist_hourglass(grid_, rate, hourglass_x_, hourglass_y_));
-                   });
+            timer_("hourglass", [&] { node_ops_.note_hourglass(resist_hourglass(grid_, hourglass_rate(), hourglass_x_, hourglass_y_)); });
         internal_ = force_norm(nodes_);
         timer_("node operations (11)(15)",
                [&]
@@ -85,18 +87,20 @@ public:
                        node_ops_.apply_load(nodes_, [&] { add_body_force(t); });
                    if (tractions_)
                        node_ops_.apply_load(nodes_, [&] { tractions_->apply(grid_.lattice, bodies_, nodes_, t); });
+                   if (weight_)
+                       find_weight();
                    node_ops_.apply_forces(grid_.lattice, nodes_, t);
                });
-        lag_ = started_ ? 0.5 * dt : 0;
+        lag_ = 0.5 * step.last_dt;
     }
 
-    void advance(double dt) override
+    void do_advance(const Step& step) override
     {
-        // the given initial velocity is that of t = 0: the first kick is half a step
+        const double dt = step.dt;
         timer_("acceleration (12)(14)",
                [&]
                {
-                   node_ops_.kick(nodes_, started_ ? dt : 0.5 * dt);
+                   node_ops_.kick(nodes_, step.kick());
                    node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
                });
         if (faces_)
@@ -170,13 +174,21 @@ public:
     {
         return bytes_of(bodies_) + grid_.bytes() + mass_before_.capacity() * sizeof(double) + sums_.bytes() +
                (workspace_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity()) * sizeof(double) +
-               cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
+               cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) +
+               (weight_ ? weight_->bytes() : 0) + cell_weight_.capacity() * sizeof(double);
     }
     void write_state(StateWriter& writer) override { state(writer); }
     void read_state(StateReader& reader) override { state(reader); }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
+    std::vector<StepLimit> step_limits() override { return lpfdm_step_limits(grid_, bodies_, hourglass_rate(), damping_); }
+    std::optional<double> sharp_step_limit() override
+    {
+        ElementSystem elements = lpfdm_elements<Support>(grid_.lattice, bodies_, hourglass_rate());
+        fix(elements, node_ops_.restraints(), grid_.lattice);
+        return lpfdm_sharp_limit(elements, damping_);
+    }
 
 private:
     static constexpr int S = Support::S;
@@ -197,6 +209,7 @@ private:
             body.state(a);
         node_ops_.state(a);
         a.value("started", "-", started_);
+        a.value("last_dt", "s", last_dt_);
         Lattice lattice = grid_.lattice;
         lattice.state(a);
         if constexpr (Archive::reads)
@@ -264,6 +277,18 @@ private:
         moved_ = false;
     }
 
+    double hourglass_rate() const { return options_.hourglass * wave_speed_ / grid_.lattice.cell_size; }
+
+    /// The masses of the nodes that have weight: a quarter of those of the cells around them.
+    void find_weight()
+    {
+        weight_->nodes.assign(nodes_.mass.size(), 0.0);
+        weight_->collect<4>(bodies_, grid_.gather, sums_.all(), S * S, [&](std::size_t c, double mass) { cell_weight_[c] = mass; });
+        for (const auto c : grid_.gather.active())
+            for (int k = 0; k < 4; ++k)
+                weight_->nodes[grid_.corner(grid_.first_node(c), k)] += 0.25 * cell_weight_[c];
+    }
+
     void renumber(const Lattice& to)
     {
         testbed::renumber(mass_before_, grid_.lattice, to);
@@ -272,6 +297,8 @@ private:
             faces_->resize(to.nodes());
         if (body_force_)
             cell_force_.assign(to.cells(), {0, 0});
+        if (weight_)
+            cell_weight_.assign(to.cells(), 0.0);
         if (nonlocal_)
             nonlocal_->resize(to.cell_stride(), to.cells());
         if (options_.hourglass > 0)
@@ -437,8 +464,10 @@ private:
     std::optional<BodyForce> body_force_;
     std::optional<Tractions> tractions_;
     std::optional<NonlocalStrain> nonlocal_;
+    std::optional<NodalWeight> weight_;
+    std::vector<double> cell_weight_;  ///< empty without density scaling
     PhaseTimer timer_;
-    double wave_speed_ = 0, internal_ = 0, lag_ = 0;
+    double damping_ = 0, wave_speed_ = 0, internal_ = 0, lag_ = 0;
     double gradients_over_ = 0;  ///< the step over which the cells hold the gradients of the present velocity; 0: none
     bool moved_ = false, was_rebuilt_ = true, started_ = false;
 };

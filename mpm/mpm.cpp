@@ -1,12 +1,14 @@
 #include "mpm/mpm.hpp"
 
 #include "core/body_force.hpp"
+#include "core/density_scaling.hpp"
 #include "core/gather.hpp"
 #include "core/nonlocal.hpp"
 #include "core/tractions.hpp"
 #include "mpm/edges.hpp"
 #include "mpm/null_space.hpp"
 #include "mpm/small_nodes.hpp"
+#include "mpm/time_step.hpp"
 #include "mpm/velocity_update.hpp"
 #include "mpm/xpic.hpp"
 
@@ -41,11 +43,16 @@ public:
             tractions_.emplace(scene);
         if (has_nonlocal_softening(scene))
             nonlocal_.emplace(scene, lattice_.cell_size);
+        if (scene.time.density_scaling)
+            node_ops_.weigh_with(weight_.emplace().nodes);
+        if (scene.damping)
+            damping_ = scene.damping->local;
         rebuild();
     }
 
-    void prepare(double t, double dt) override
+    void do_prepare(const Step& step) override
     {
+        const double t = step.t, dt = step.dt;
         node_ops_.begin_step(t, dt);
         timer_("bins",
                [&]
@@ -65,7 +72,7 @@ public:
                        restrain_mapped_velocity();
                    });
             if (started_)
-                timer_("stress", [&] { update_stress(dt); });
+                timer_("stress", [&] { update_stress(step.last_dt); });
             timer_("points to nodes", [&] { points_to_nodes<Scatter::force>(); });
         }
         else
@@ -89,19 +96,21 @@ public:
                                                 tractions_->apply(lattice_, bodies_, nodes_, t);
                                                 fold_forces();
                                             });
+                   if (weight_)
+                       find_weight();
                    node_ops_.apply_forces(lattice_, nodes_, t);
                });
-        lag_ = started_ ? 0.5 * dt : 0;
+        lag_ = 0.5 * step.last_dt;
     }
 
-    void advance(double dt) override
+    void do_advance(const Step& step) override
     {
+        const double dt = step.dt;
         if (xpic_)
             timer_("xpic", [&] { filter_velocity(); });
         if (options_.null_space_filter == "cell")
             timer_("null-space filter", [&] { filter_points(); });
-        // the given initial velocity is that of t = 0: the first kick is half a step
-        timer_("acceleration", [&] { accelerate_and_keep_increment(started_ ? dt : 0.5 * dt); });
+        timer_("acceleration", [&] { accelerate_and_keep_increment(step.kick()); });
         started_ = true;
         const bool remap = options_.scheme == "musl";
         timer_("nodes to points", [&] { update_velocity(remap); });
@@ -163,13 +172,28 @@ public:
                (xpic_ ? xpic_->bytes() : 0) +
                (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
                    sizeof(double) +
-               (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0);
+               (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) + (weight_ ? weight_->bytes() : 0);
     }
     void write_state(StateWriter& writer) override { state(writer); }
     void read_state(StateReader& reader) override { state(reader); }
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
     const char* kinematics() const override { return "hypoelastic"; }
+    std::vector<StepLimit> step_limits() override
+    {
+        if (moved_)
+            rebuild();
+        return mpm_step_limits<Shape>(lattice_, bodies_, options_, damping_);
+    }
+    /// Without the filters of the velocity, which are not in this system.
+    std::optional<double> sharp_step_limit() override
+    {
+        if (xpic_ || options_.null_space_filter != "none")
+            return std::nullopt;
+        ElementSystem elements = mpm_elements<Shape, Strain>(lattice_, bodies_);
+        fix(elements, node_ops_.restraints(), lattice_);
+        return mpm_sharp_limit(elements, options_, damping_);
+    }
 
 private:
     static constexpr int S = Shape::S;
@@ -182,6 +206,7 @@ private:
             body.state(a);
         node_ops_.state(a);
         a.value("started", "-", started_);
+        a.value("last_dt", "s", last_dt_);
         Lattice lattice = lattice_;
         lattice.state(a);
         if constexpr (Archive::reads)
@@ -223,6 +248,23 @@ private:
         if (options_.scheme != "usf")
             other_bins ? sums_.update(lattice_, bodies_) : sums_.update_changed(lattice_, bodies_);
         moved_ = false;
+    }
+
+    /// The masses of the nodes that have weight.
+    void find_weight()
+    {
+        weight_->nodes.assign(nodes_.mass.size(), 0.0);
+        const auto take = [&](std::size_t n, double mass) { weight_->nodes[n] = mass; };
+        if (options_.scheme == "usf")
+        {
+            points_to_nodes<Scatter::momentum>();  // once more: the workspace holds forces now
+            restrain_mapped_velocity();
+            weight_->collect<sums_of<Scatter::momentum>>(bodies_, gather_, workspace_, S * S, take);
+        }
+        else
+            weight_->collect<sums_of<Scatter::momentum_and_force>>(bodies_, gather_, sums_.all(), S * S, take);
+        if constexpr (reaches_beyond)
+            edges_.fold_mass(weight_->nodes);
     }
 
     /// The nodes that bins touch.
@@ -629,8 +671,9 @@ private:
     std::optional<BodyForce> body_force_;
     std::optional<Tractions> tractions_;
     std::optional<NonlocalStrain> nonlocal_;
+    std::optional<NodalWeight> weight_;
     PhaseTimer timer_;
-    double internal_ = 0, lag_ = 0;
+    double damping_ = 0, internal_ = 0, lag_ = 0;
     bool moved_ = false, started_ = false;
 };
 }  // namespace

@@ -9,6 +9,8 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <gtest/gtest.h>
+
+#include <map>
 #include <numbers>
 
 using namespace testbed;
@@ -205,6 +207,8 @@ TEST(Modes, PhaseOfTheLeapFrog)
     bool found = false;
     for (const Mode& m : spectrum(c.map().matrix).modes)
     {
+        if (m.growth() < 1e-9)  // what a step forgets: the mass before
+            continue;
         EXPECT_NEAR(m.growth(), 1, 1e-8);
         found |= std::abs(m.phase() - expected) < 1e-7;
     }
@@ -221,19 +225,18 @@ TEST(Modes, CentralConvectionIsUnstableAtATrailingFace)
                {"lpfdm.convection=" + convection, "lpfdm.frontier=extrapolate", "lpfdm.hourglass=0"}, 5);
         const OneStepMap map = c.map();
         const Spectrum s = spectrum(map.matrix);
-        // where it is: the share of its velocity that the nodes of the trailing face have
-        double trailing = 0, all = 0;
+        // where it is: whether the nodes of the trailing face have most of its velocity
+        std::map<int, double> columns;
         for (const auto n : map.all(Unknown::Kind::velocity))
         {
-            const double square = std::norm(s.modes.front().shape[n]);
-            all += square;
-            trailing += map.unknowns[static_cast<std::size_t>(n)].node.i == 2 ? square : 0;
+            columns[map.unknowns[static_cast<std::size_t>(n)].node.i] += std::norm(s.modes.front().shape[n]);
         }
-        return std::pair(s.radius, trailing / all);
+        const auto most = std::max_element(columns.begin(), columns.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+        return std::pair(s.radius, most->first);
     };
-    const auto [radius, trailing] = largest(0.1 * wave_speed, "central");
+    const auto [radius, column] = largest(0.1 * wave_speed, "central");
     EXPECT_GT(radius, 1.005);
-    EXPECT_GT(trailing, 0.4);  // one column of nodes of five
+    EXPECT_EQ(column, 2);
     EXPECT_LT(largest(0.1 * wave_speed, "none").first, 1 + 1e-7);
     EXPECT_LT(largest(0, "central").first, 1 + 1e-7);
 }
@@ -241,6 +244,7 @@ TEST(Modes, CentralConvectionIsUnstableAtATrailingFace)
 /// The map over the steps in which a body moves by a cell: a body that only flies comes back to where it was in its own cells.
 TEST(Modes, MapOverACell)
 {
+    // mass that arrives brings its velocity by a rule that is not linear about rigid motion: left out here
     Case c(block(2, 0.3, "velocity = [\"4\", 0]", 0.113), "lpfdm",
            {"time.dt=0.0125", "lpfdm.convection=central", "lpfdm.frontier=extrapolate"});
     const OneStepMap map = c.map(20);

@@ -47,7 +47,7 @@ TEST(Accelerate, ByForceOverMass)
 {
     Nodes nodes = two_nodes();
     nodes.mass[2] = 0;
-    accelerate(nodes, 0.1);
+    accelerate(nodes, nodes.mass, 0.1);
     EXPECT_DOUBLE_EQ(nodes.vx[0], 1.5);
     EXPECT_DOUBLE_EQ(nodes.vx[1], 7);
     EXPECT_DOUBLE_EQ(nodes.vx[2], -1);  // no mass, no acceleration

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <set>
 #include <vector>
 
 namespace testbed::test
@@ -50,15 +51,49 @@ inline void ref_stress(RefPoint& p, const Gradient<>& d)
     p.s.xy += mu * (d.xy + d.yx);
 }
 
+/// 1 / (1 + e) as far as the square of e: so far do the methods take it for the strain of one step.
+inline double ref_inverse(double e)
+{
+    return 1 - e + e * e;
+}
+
+/// Gradient of the displacement over the middle of the step, G (I + G/2)^-1, from the one over its start.
+inline Gradient<> ref_midpoint(const Gradient<>& g)
+{
+    const double a = 1 + g.xx / 2, b = g.xy / 2, c = g.yx / 2, d = 1 + g.yy / 2, inverse = ref_inverse(a * d - b * c - 1);
+    return {(g.xx * d - g.xy * c) * inverse, (g.yy * a - g.yx * b) * inverse, (g.xy * a - g.xx * b) * inverse,
+            (g.yx * d - g.yy * c) * inverse};
+}
+
+/// New over old length for a strain over the middle of the step, (1 + d/2) / (1 - d/2) as far as the square of d.
+inline double ref_ratio(double d)
+{
+    return 1 + d + d * d / 2;
+}
+
+/// v of (I + G) v = u, by repetition.
+inline Vec2 ref_departed(const Vec2& u, const Gradient<>& g)
+{
+    Vec2 v = u;
+    for (int sweep = 0; sweep < 60; ++sweep)
+        v = {u[0] - v[0] * g.xx - v[1] * g.xy, u[1] - v[0] * g.yx - v[1] * g.yy};
+    return v;
+}
+
 /// LPFDM, eqs. (4)-(15).
 struct RefLpfdm
 {
     RefGrid grid;
     std::vector<RefPoint> points;
     bool domain, central;
+    bool two_sided = false, arrival = false;
     double hourglass_rate = 0;
     std::map<Key, Vec2> v{};  ///< velocity of the nodes that had mass in the step before
+    std::map<Key, Vec2> ahead{};  ///< of nodes without mass that belong to a point's 2 x 2 cells
     std::map<Key, double> old_mass{};
+    std::set<Key> faces{};
+    double sliver_mass = 0;  ///< below which a node counts as a sliver
+    double last_dt = 0;
     bool first = true;
 
     struct Cell
@@ -97,11 +132,201 @@ struct RefLpfdm
                    (b[1] + e[1] - a[1] - d[1]) * f};
         }
     }
+    static double mass_of(const std::map<Key, Cell>& cells, int i, int j)
+    {
+        const auto found = cells.find({i, j});
+        return found == cells.end() ? 0 : found->second.M;
+    }
+    /// Share of a side that is missing: 0 while the lighter side has half of the heavier one or more.
+    static double missing(double a, double b)
+    {
+        return a == b ? 0 : std::max(0.0, 1 - 2 * std::min(a, b) / std::max(a, b));
+    }
+    void find_faces(const std::map<Key, Cell>& cells, const std::map<Key, double>& m)
+    {
+        faces.clear();
+        for (const auto& [k, mass] : m)
+        {
+            const auto [i, j] = k;
+            const double a = mass_of(cells, i - 1, j - 1), b = mass_of(cells, i, j - 1), c = mass_of(cells, i - 1, j), d = mass_of(cells, i, j);
+            if ((missing(a + c, b + d) > 0 && v[k][0] != 0) || (missing(a + b, c + d) > 0 && v[k][1] != 0) || mass < sliver_mass)
+                faces.insert(k);
+        }
+    }
+    /// v(x) <- v(x - v dt/2), with what arrives at the nodes that won mass.
+    void convect_half(std::map<Key, Cell>& cells, const std::map<Key, double>& m, double dt, bool mass_arrives)
+    {
+        const double h = dt / 2, L = grid.L;
+        gradients(cells, dt);
+        const std::map<Key, Vec2> u = v;
+        std::map<Key, Gradient<>> rate;  // velocity gradient at nodes: mean of the cells, at half of the way that is gone in dt/2
+        for (const auto& [k, mass] : m)
+        {
+            double total = 0;
+            for (int dj = -1; dj <= 0; ++dj)
+                for (int di = -1; di <= 0; ++di)
+                {
+                    const auto found = cells.find({k.first + di, k.second + dj});
+                    if (found == cells.end())
+                        continue;
+                    const double x = std::clamp(u.at(k)[0] * h / L, -1.0, 1.0), y = std::clamp(u.at(k)[1] * h / L, -1.0, 1.0);
+                    const double w = found->second.M * (di < 0 ? 1 + x : 1 - x) * (dj < 0 ? 1 + y : 1 - y);
+                    rate[k] = rate[k] + (w / dt) * found->second.g;
+                    total += w;
+                }
+            rate[k] = (1 / total) * rate[k];
+        }
+        // what the neighbours say of a node: mean velocity, and what their gradients add on the way to it
+        const auto neighbours = [&](const Key& k, const std::map<Key, Vec2>& velocity, bool with_mass_before)
+        {
+            double total = 0;
+            Vec2 mean{0, 0}, beyond{0, 0};
+            for (const auto& [other, mass] : m)
+            {
+                const int di = k.first - other.first, dj = k.second - other.second;
+                if (other == k || std::abs(di) > 1 || std::abs(dj) > 1 || (with_mass_before && !old_mass.count(other)))
+                    continue;
+                const double w = with_mass_before ? std::min(mass, old_mass.at(other)) : mass;
+                const Gradient<>& g = rate.at(other);
+                total += w;
+                for (int d = 0; d < 2; ++d)
+                    mean[d] += w * velocity.at(other)[d];
+                beyond[0] += w * L * (g.xx * di + g.xy * dj);
+                beyond[1] += w * L * (g.yx * di + g.yy * dj);
+            }
+            if (total > 0)
+                for (int d = 0; d < 2; ++d)
+                {
+                    mean[d] /= total;
+                    beyond[d] /= total;
+                }
+            return std::pair{mean, beyond};
+        };
+        for (const auto& [k, mass] : m)
+        {
+            const auto [i, j] = k;
+            Vec2 w = u.at(k);
+            Gradient<> g = h * rate.at(k);
+            if (faces.count(k))
+            {
+                const double before = old_mass.count(k) ? old_mass.at(k) : 0;
+                const double share = std::max({0.0, mass_arrives ? 1 - before / mass : 0.0, 1 - mass / sliver_mass});
+                if (share > 0)
+                {
+                    const auto [mean, beyond] = neighbours(k, u, mass_arrives);
+                    const double own = std::hypot(w[0] - mean[0], w[1] - mean[1]), far = std::hypot(beyond[0], beyond[1]);
+                    const double limit = far > own ? own / far : 1, factor = share + (1 - share) * limit;
+                    for (int d = 0; d < 2; ++d)
+                        w[d] = (1 - share) * w[d] + share * (mean[d] + factor * beyond[d]);
+                }
+                // derivatives across a face: from the two cells one further inside
+                const auto pair = [&](const Key& a, const Key& b)
+                {
+                    double M = 0;
+                    Gradient<> mean{};
+                    for (const Key& c : {a, b})
+                        if (cells.count(c))
+                        {
+                            M += cells.at(c).M;
+                            mean = mean + (cells.at(c).M / dt) * cells.at(c).g;
+                        }
+                    return std::pair{M, M > 0 ? (1 / M) * mean : mean};
+                };
+                const double left = mass_of(cells, i - 1, j - 1) + mass_of(cells, i - 1, j), right = mass_of(cells, i, j - 1) + mass_of(cells, i, j);
+                const double down = mass_of(cells, i - 1, j - 1) + mass_of(cells, i, j - 1), up = mass_of(cells, i - 1, j) + mass_of(cells, i, j);
+                if (const double part = missing(left, right); part > 0)
+                {
+                    const int next = right > left ? i + 1 : i - 2;
+                    const auto [M, inner] = pair({next, j - 1}, {next, j});
+                    const double take = part * std::min(1.0, M / std::max(left, right));
+                    g.xx = (1 - part) * g.xx + take * h * inner.xx;
+                    g.yx = (1 - part) * g.yx + take * h * inner.yx;
+                }
+                if (const double part = missing(down, up); part > 0)
+                {
+                    const int next = up > down ? j + 1 : j - 2;
+                    const auto [M, inner] = pair({i - 1, next}, {i, next});
+                    const double take = part * std::min(1.0, M / std::max(down, up));
+                    g.xy = (1 - part) * g.xy + take * h * inner.xy;
+                    g.yy = (1 - part) * g.yy + take * h * inner.yy;
+                }
+            }
+            v[k] = ref_departed(w, g);
+        }
+        ahead.clear();
+        for (const RefPoint& p : points)
+        {
+            const Key bin = bin_of(p);
+            for (int b = 0; b <= 2 && domain; ++b)
+                for (int a = 0; a <= 2; ++a)
+                    if (const Key k{bin.first + a, bin.second + b}; !m.count(k) && !ahead.count(k))
+                    {
+                        const auto [mean, beyond] = neighbours(k, v, false);
+                        ahead[k] = {mean[0] + beyond[0], mean[1] + beyond[1]};
+                    }
+        }
+    }
+    /// First of the 2 x 2 cells that a box can reach.
+    Key bin_of(const RefPoint& p) const
+    {
+        return {static_cast<int>(std::floor((p.x - grid.ox) / grid.L - std::min(p.hx / grid.L, 0.5) + 1e-9)),
+                static_cast<int>(std::floor((p.y - grid.oy) / grid.L - std::min(p.hy / grid.L, 0.5) + 1e-9))};
+    }
+    Vec2 velocity_of(const Key& k) const
+    {
+        if (const auto found = v.find(k); found != v.end())
+            return found->second;
+        const auto found = ahead.find(k);
+        return found == ahead.end() ? Vec2{0, 0} : found->second;
+    }
+    /// Moves and strains a box with the velocity that it meets in the middle of the step. It gets there with the mean gradient of its 2 x 2
+    /// cells about their middle node.
+    void move_from_mid_step(RefPoint& p, double dt)
+    {
+        const double L = grid.L, hx = std::min(p.hx / L, 0.5), hy = std::min(p.hy / L, 0.5);
+        const Key bin = bin_of(p);
+        Gradient<> cell[2][2], mean{};
+        for (int j = 0; j < 2; ++j)
+            for (int i = 0; i < 2; ++i)
+            {
+                const auto at = [&](int a, int b) { return velocity_of({bin.first + i + a, bin.second + j + b}); };
+                const Vec2 a = at(0, 0), b = at(1, 0), c = at(0, 1), d = at(1, 1);
+                const double f = dt / (2 * L);
+                cell[j][i] = {f * (b[0] + d[0] - a[0] - c[0]), f * (c[1] + d[1] - a[1] - b[1]), f * (c[0] + d[0] - a[0] - b[0]),
+                              f * (b[1] + d[1] - a[1] - c[1])};
+                mean = mean + 0.25 * cell[j][i];
+            }
+        const Vec2 u = velocity_of({bin.first + 1, bin.second + 1});
+        const double x = (p.x - grid.ox) / L - bin.first - 1, y = (p.y - grid.oy) / L - bin.second - 1;  // from the middle node
+        // how far beyond the lattice lines it is then, in lengths of the start
+        const double bx = x + (mean.xy * y + u[0] * dt / L) / 2 * ref_inverse(mean.xx / 2);
+        const double by = y + (mean.yx * x + u[1] * dt / L) / 2 * ref_inverse(mean.yy / 2);
+        const double a = std::clamp((bx + hx) / (2 * hx), 0.0, 1.0), b = std::clamp((by + hy) / (2 * hy), 0.0, 1.0);
+        const Gradient<> g = (1 - a) * (1 - b) * cell[0][0] + a * (1 - b) * cell[0][1] + (1 - a) * b * cell[1][0] + a * b * cell[1][1];
+        const double X = bx * (1 + mean.xx / 2), Y = by * (1 + mean.yy / 2);
+        const double nx[] = {std::max(0.0, -X), 1 - std::abs(X), std::max(0.0, X)}, ny[] = {std::max(0.0, -Y), 1 - std::abs(Y), std::max(0.0, Y)};
+        for (int j = 0; j < 3; ++j)
+            for (int i = 0; i < 3; ++i)
+            {
+                const Vec2 w = velocity_of({bin.first + i, bin.second + j});
+                p.x += nx[i] * ny[j] * w[0] * dt;
+                p.y += nx[i] * ny[j] * w[1] * dt;
+            }
+        ref_stress(p, g);
+        p.hx *= ref_ratio(g.xx);
+        p.hy *= ref_ratio(g.yy);
+    }
     /// @param initial (point, position of a node) -> velocity that the point's body gives the node
     void step(double dt, const Vec2& gravity, const std::function<Vec2(std::size_t, Vec2)>& initial)
     {
         std::map<Key, Cell> cells;
         const double L = grid.L;
+        if (first)
+        {
+            sliver_mass = 1e-3 * L * L * points[0].m / points[0].V;
+            for (const RefPoint& p : points)
+                sliver_mass = std::min(sliver_mass, 1e-3 * L * L * p.m / p.V);
+        }
         for (const RefPoint& p : points)
             for (const auto& [k, w] : cells_of(p))
             {
@@ -162,11 +387,18 @@ struct RefLpfdm
                 now[k] = total > 0 ? Vec2{p[0] / total, p[1] / total} : Vec2{0, 0};
             }
             v = now;
-            gradients(cells, dt);
+            gradients(cells, last_dt);
             const std::map<Key, Vec2> u = v;
+            if (two_sided)
+            {
+                find_faces(cells, m);
+                convect_half(cells, m, last_dt, arrival);
+            }
             for (auto& [k, w] : v)
             {
-                const double cx = u.at(k)[0] * dt / L, cy = u.at(k)[1] * dt / L;
+                if (two_sided)
+                    break;
+                const double cx = u.at(k)[0] * last_dt / L, cy = u.at(k)[1] * last_dt / L;
                 Gradient<> g{};
                 double total = 0;
                 for (int dj = -1; dj <= 0; ++dj)
@@ -204,12 +436,24 @@ struct RefLpfdm
         }
         for (auto& [k, w] : v)
             for (int d = 0; d < 2; ++d)
-                w[d] += (F[k][d] / m[k] + gravity[d]) * (first ? 0.5 : 1.0) * dt;
+                w[d] += (F[k][d] / m[k] + gravity[d]) * 0.5 * (last_dt + dt);
+        if (two_sided)
+        {
+            if (first)
+                find_faces(cells, m);
+            convect_half(cells, m, dt, false);
+        }
         first = false;
+        last_dt = dt;
         old_mass = m;
         gradients(cells, dt);
         for (RefPoint& p : points)
         {
+            if (two_sided && domain)
+            {
+                move_from_mid_step(p, dt);
+                continue;
+            }
             Gradient<> g{};
             for (const auto& [k, w] : cells_of(p))
             {
@@ -227,7 +471,7 @@ struct RefLpfdm
                 p.y += N * w[1] * dt;
             }
             ref_stress(p, g);
-            p.V *= 1 + g.xx + g.yy;
+            p.V *= two_sided ? ref_ratio(g.xx + g.yy) : 1 + g.xx + g.yy;
             p.hx *= 1 + g.xx;
             p.hy *= 1 + g.yy;
         }
@@ -243,6 +487,7 @@ struct RefMpm
     std::string scheme;
     double flip = 1;
     bool b_bar = false;
+    bool midpoint = true;
     bool first = true;
     int xpic = 0;                                                ///< order, 0 is FLIP
     double least = 0;                                            ///< mass of a node that counts
@@ -421,7 +666,8 @@ struct RefMpm
             volumetric += (b[k][0] * v[0] + b[k][1] * v[1]) * dt;
         }
         const double c = 0.5 * (volumetric - g.xx - g.yy);
-        return {g.xx + c, g.yy + c, g.xy, g.yx};
+        g = {g.xx + c, g.yy + c, g.xy, g.yx};
+        return midpoint ? ref_midpoint(g) : g;
     }
     void map_momentum(std::map<Key, Node>& nodes) const
     {
@@ -500,9 +746,10 @@ struct RefMpm
             RefPoint& p = points[n];
             if (scheme != "usf")
                 ref_stress(p, g[n]);
-            p.V *= 1 + g[n].xx + g[n].yy;
-            p.hx *= 1 + g[n].xx;
-            p.hy *= 1 + g[n].yy;
+            const auto ratio = [&](double d) { return midpoint ? ref_ratio(d) : 1 + d; };
+            p.V *= ratio(g[n].xx + g[n].yy);
+            p.hx *= ratio(g[n].xx);
+            p.hy *= ratio(g[n].yy);
             p.x += move[n][0] - 0.5 * dt * taken[n][0];
             p.y += move[n][1] - 0.5 * dt * taken[n][1];
         }

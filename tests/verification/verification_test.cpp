@@ -15,7 +15,7 @@ using namespace testbed;
 
 namespace
 {
-struct State
+struct Outcome
 {
     Scene scene;
     std::unique_ptr<Solver> solver;
@@ -24,11 +24,11 @@ struct State
 
 /// Runs a case to its end, or to rest if the scene says when that is.
 template <class Watch>
-State run(const std::string& name, const std::string& method, const std::vector<std::string>& overrides, Watch&& watch)
+Outcome run(const std::string& name, const std::string& method, const std::vector<std::string>& overrides, Watch&& watch)
 {
-    State s{load_scene(std::string(BENCHMARKS) + "/" + name + "/scene.toml", method, overrides).scene, nullptr};
+    Outcome s{load_scene(std::string(BENCHMARKS) + "/" + name + "/scene.toml", method, overrides).scene, nullptr};
     s.solver = find_variant(method).family == "mpm" ? make_mpm(s.scene) : make_lpfdm(s.scene);
-    const double dt = time_step(s.scene);
+    const double dt = time_step(s.scene, *s.solver);
     const int steps = static_cast<int>(std::ceil(s.scene.time.end / dt));
     for (int n = 0; n <= steps; ++n)
     {
@@ -45,9 +45,9 @@ State run(const std::string& name, const std::string& method, const std::vector<
     }
     return s;
 }
-State run(const std::string& name, const std::string& method, const std::vector<std::string>& overrides = {})
+Outcome run(const std::string& name, const std::string& method, const std::vector<std::string>& overrides = {})
 {
-    return run(name, method, overrides, [](const State&) {});
+    return run(name, method, overrides, [](const Outcome&) {});
 }
 
 struct Errors
@@ -55,7 +55,7 @@ struct Errors
     double stress_l2 = 0, stress_l1 = 0, displacement_l2 = 0;
 };
 
-Errors errors(const State& s)
+Errors errors(const Outcome& s)
 {
     const Constants constants = s.scene.expression_constants();
     const ExactSpec& exact = s.scene.exact.at("hypoelastic");
@@ -122,7 +122,7 @@ TEST(Column, QuadraticBSplines)
         double before = 0;
         for (const double L : {2.0, 1.0})
         {
-            const State state = run("elastic_column", "mpm-bspline", {"grid.cell_size=" + std::to_string(L), "mpm.scheme=" + scheme});
+            const Outcome state = run("elastic_column", "mpm-bspline", {"grid.cell_size=" + std::to_string(L), "mpm.scheme=" + scheme});
             const Errors e = errors(state);
             EXPECT_LT(e.stress_l2, 0.008 * std::pow(L, 1.5)) << scheme;
             EXPECT_LT(e.displacement_l2, 0.003 * L * L) << scheme;
@@ -162,7 +162,7 @@ TEST(SuddenColumn, FirstPeak)
     {
         double peak = 0, time = 0, static_tip = 0;
         run("elastic_column_sudden", method, {"time.end=H*3/c"},
-            [&](const State& s)
+            [&](const Outcome& s)
             {
                 const Points& q = s.solver->bodies()[0].points;
                 double lowest = 0, top = 0;
@@ -189,8 +189,8 @@ TEST(FreeFlight, MomentumAndNoStress)
     for (const auto& method : particle_methods)
     {
         Vec2 start{0, 0};
-        const State s = run("free_flight", method, {"constants.ppc=2"},
-                            [&](const State& now)
+        const Outcome s = run("free_flight", method, {"constants.ppc=2"},
+                            [&](const Outcome& now)
                             {
                                 if (now.t == 0)
                                     start = now.solver->sums().momentum;
@@ -320,8 +320,8 @@ TEST(EmptyLattice, HoldsASingleCell)
 TEST(FreeFlight, LiteralFrontierLosesMomentum)
 {
     double start = 0;
-    const State s = run("free_flight", "lpfdm-2000", {"lpfdm.frontier=literal"},
-                        [&](const State& now)
+    const Outcome s = run("free_flight", "lpfdm-2000", {"lpfdm.frontier=literal"},
+                        [&](const Outcome& now)
                         {
                             if (now.t == 0)
                                 start = now.solver->sums().momentum[0];
@@ -335,8 +335,8 @@ TEST(RotatingDisk, AngularMomentumAndEnergy)
     for (const std::string method : {"lpfdm-2000", "lpfdm"})
     {
         double start = 0, energy = 0, most = 0;
-        const State s = run("rotating_disk", method, {},
-                            [&](const State& now)
+        const Outcome s = run("rotating_disk", method, {},
+                            [&](const Outcome& now)
                             {
                                 const MotionSums sums = now.solver->sums();
                                 const double e = sums.kinetic_energy * (1 + 1 / Observer::kinetic_ratio(*now.solver));

@@ -1,0 +1,228 @@
+#include "mpm/time_step.hpp"
+
+#include <cmath>
+#include <string>
+
+namespace testbed
+{
+namespace
+{
+/// f(p, at, lane) for the points of a bin: the shape functions at p are the lane of `at`.
+template <class Shape, class F>
+void for_each_point(const Lattice& lattice, const Points& q, const Bin& bin, F&& f)
+{
+    const BinFrame frame(lattice, bin);
+    for_each_pack(bin.begin, bin.end,
+                  [&](std::size_t p, const auto& lanes)
+                  {
+                      const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
+                      for (std::size_t lane = 0; lane < pack_size && p + lane < bin.end; ++lane)
+                          f(p + lane, at, lane);
+                  });
+}
+
+/// Limit for stress last, whatever the neighbours: the largest eigenvalue of each bin's own stiffness with its own masses (Irons), doubled
+/// for H = 0. In a bin eps : D : eps is at most kappa |grad u|^2, which leaves a scalar problem on its S x S nodes; its largest eigenvalue
+/// is bounded by the 16th root of the trace of its 16th power, at most S^(1/8) too large.
+template <class Shape>
+double content_limit(const Lattice& lattice, const std::vector<Body>& bodies)
+{
+    constexpr std::size_t S = Shape::S, n = S * S;
+    double largest = 0;
+    for (const Body& body : bodies)
+    {
+        const Points& q = body.points;
+        const double kappa = gradient_stiffness(moduli(body.material));
+        const auto& bins = body.bins.list();
+        largest = std::max(largest, parallel_max(bins.size(),
+                                                 [&](std::size_t b)
+                                                 {
+                                                     std::array<double, n> mass{};
+                                                     std::array<double, n * n> a{}, square;
+                                                     for_each_point<Shape>(lattice, q, bins[b],
+                                                                           [&](std::size_t p, const ShapeAt<Shape>& at, std::size_t lane)
+                                                                           {
+                                                                               const double v =
+                                                                                   kappa * q.current_volume(p) * stiffness_ratio(q, p);
+                                                                               std::array<double, n> x, y;
+                                                                               for (std::size_t k = 0; k < n; ++k)
+                                                                               {
+                                                                                   const int i = static_cast<int>(k % S),
+                                                                                             j = static_cast<int>(k / S);
+                                                                                   mass[k] += q.mass * at.value(i, j)[lane];
+                                                                                   x[k] = at.slope_x(i, j)[lane];
+                                                                                   y[k] = at.slope_y(i, j)[lane];
+                                                                               }
+                                                                               for (std::size_t k = 0; k < n; ++k)
+                                                                                   for (std::size_t l = 0; l < n; ++l)
+                                                                                       a[k * n + l] += v * (x[k] * x[l] + y[k] * y[l]);
+                                                                           });
+                                                     double scale = 0;
+                                                     for (std::size_t k = 0; k < n; ++k)
+                                                         for (std::size_t l = 0; l < n; ++l)
+                                                         {
+                                                             double& e = a[k * n + l];
+                                                             e = mass[k] > 0 && mass[l] > 0 ? e / std::sqrt(mass[k] * mass[l]) : 0.0;
+                                                             scale = std::max(scale, e);
+                                                         }
+                                                     if (!(scale > 0))
+                                                         return 0.0;
+                                                     for (double& e : a)
+                                                         e /= scale;
+                                                     for (int power = 0; power < 4; ++power, a = square)
+                                                         for (std::size_t k = 0; k < n; ++k)
+                                                             for (std::size_t l = 0; l < n; ++l)
+                                                             {
+                                                                 double s = 0;
+                                                                 for (std::size_t i = 0; i < n; ++i)
+                                                                     s += a[k * n + i] * a[i * n + l];
+                                                                 square[k * n + l] = s;
+                                                             }
+                                                     double trace = 0;
+                                                     for (std::size_t k = 0; k < n; ++k)
+                                                         trace += a[k * n + k];
+                                                     return scale * std::pow(trace, 1.0 / 16);
+                                                 }));
+    }
+    return 2 / std::sqrt(2 * largest);
+}
+
+}  // namespace
+
+template <class Shape>
+std::vector<StepLimit> mpm_step_limits(const Lattice& lattice, const std::vector<Body>& bodies, const MpmSpec& options, double alpha)
+{
+    const double factor = damping_factor(alpha) * std::sqrt(0.5 * (1 + options.flip));
+    std::vector<StepLimit> limits;
+    if (options.scheme == "usl")
+        limits.push_back({"cell content", content_limit<Shape>(lattice, bodies) * factor});
+    else
+    {
+        const double cell = lattice.cell_size * lattice.cell_size;
+        const bool sparse = std::any_of(bodies.begin(), bodies.end(), [&](const Body& b) { return b.points.initial_volume > 0.9 * cell; });
+        const double on_nodes = sparse && std::is_same_v<Shape, LinearShape> ? std::sqrt(0.5) : 1.0;
+        limits.push_back({"stiffness", isolated_cell_limit(bodies, lattice.cell_size) * factor * on_nodes});
+    }
+    double speed = 0;
+    for (const Body& body : bodies)
+        speed = std::max(speed, parallel_max(body.points.count, [&](std::size_t p)
+                                             { return std::max(std::abs(body.points.vx[p]), std::abs(body.points.vy[p])); }));
+    if (const auto courant = courant_limit(lattice.cell_size, speed))
+        limits.push_back({"motion", *courant});
+    return limits;
+}
+
+template <class Shape, class Strain>
+ElementSystem mpm_elements(const Lattice& lattice, const std::vector<Body>& bodies)
+{
+    constexpr int S = Shape::S;
+    constexpr std::size_t n = S * S, m = 2 * n;
+    ElementSystem system(n, lattice.nodes());
+    const auto fold = [](std::array<double, S>& w, int first, int last)  // as LatticeEdges does
+    {
+        if constexpr (std::is_same_v<Shape, BSplineShape>)
+        {
+            const auto give = [&](std::size_t outer, std::size_t edge, std::size_t inner)
+            {
+                w[edge] += 2 * w[outer];
+                w[inner] -= w[outer];
+                w[outer] = 0;
+            };
+            if (first < 0)
+                give(0, 1, 2);
+            if (first + 2 > last)
+                give(2, 1, 0);
+        }
+    };
+    for (const Body& body : bodies)
+    {
+        const Points& q = body.points;
+        for (const Bin& bin : body.bins.list())
+        {
+            std::array<std::uint32_t, n> node;
+            for (int k = 0; k < S * S; ++k)
+                node[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(lattice.node(bin.i + k % S, bin.j + k / S));
+            system.add_element(node);
+            [[maybe_unused]] const typename Strain::template InBin<Shape> mean(lattice, q, bin);
+            for_each_point<Shape>(lattice, q, bin,
+                                  [&](std::size_t p, const ShapeAt<Shape>& at, std::size_t lane)
+                                  {
+                                      std::array<double, S> wx, wy, gx, gy;
+                                      for (std::size_t k = 0; k < S; ++k)
+                                      {
+                                          wx[k] = at.wx[k][lane];
+                                          wy[k] = at.wy[k][lane];
+                                          gx[k] = at.gx[k][lane];
+                                          gy[k] = at.gy[k][lane];
+                                      }
+                                      fold(wx, bin.i, lattice.nx);
+                                      fold(gx, bin.i, lattice.nx);
+                                      fold(wy, bin.j, lattice.ny);
+                                      fold(gy, bin.j, lattice.ny);
+                                      std::array<double, n> value;
+                                      std::array<double, m> xx{}, yy{}, shear{};
+                                      for (std::size_t k = 0; k < n; ++k)
+                                      {
+                                          value[k] = wx[k % S] * wy[k / S];
+                                          const double x = gx[k % S] * wy[k / S], y = wx[k % S] * gy[k / S];
+                                          xx[2 * k] = x;
+                                          yy[2 * k + 1] = y;
+                                          shear[2 * k] = y;
+                                          shear[2 * k + 1] = x;
+                                          if constexpr (Strain::averaged)
+                                          {
+                                              const double dx = 0.5 * (mean.mean_x[k][0] - x), dy = 0.5 * (mean.mean_y[k][0] - y);
+                                              xx[2 * k] += dx;
+                                              yy[2 * k] += dx;
+                                              xx[2 * k + 1] += dy;
+                                              yy[2 * k + 1] += dy;
+                                          }
+                                      }
+                                      add_stiffness<m>(system, xx, yy, shear, moduli(body.material),
+                                                       q.current_volume(p) * stiffness_ratio(q, p));
+                                      for (std::size_t k = 0; k < n; ++k)
+                                      {
+                                          system.lumped_mass[node[k]] += q.mass * value[k];
+                                          for (std::size_t l = 0; l < n; ++l)
+                                              system.consistent_mass()[k * n + l] += q.mass * value[k] * value[l];
+                                      }
+                                  });
+        }
+    }
+    return system;
+}
+
+double mpm_sharp_limit(const ElementSystem& system, const MpmSpec& options, double alpha)
+{
+    const double f = options.flip;
+    std::vector<double> smoothed, rest, h;
+    const auto half_smooth = [&](std::vector<double>& v)  // H v; the iteration contracts by (1 - f) / (3 + f)
+    {
+        system.apply_smoothing(v, smoothed);
+        h.assign(v.size(), 0.0);
+        for (int k = 0; k < (f < 1 ? 20 : 1); ++k)
+        {
+            system.apply_smoothing(h, rest);
+            for (std::size_t i = 0; i < h.size(); ++i)
+                h[i] += 2 / (3 + f) * (smoothed[i] - (1 + f) * h[i] - (1 - f) * rest[i]);
+        }
+    };
+    const bool last = options.scheme == "usl";
+    const double largest = largest_eigenvalue(
+        system, [&](const auto& in, auto& out) { system.apply_stiffness(in, out); },
+        [&](std::vector<double>& v)
+        {
+            half_smooth(v);
+            for (std::size_t i = 0; i < v.size(); ++i)
+                v[i] = last ? 2 * (v[i] - h[i]) : 2 * h[i];
+        });
+    return 2 / std::sqrt((1 + alpha) * largest);
+}
+template std::vector<StepLimit> mpm_step_limits<LinearShape>(const Lattice&, const std::vector<Body>&, const MpmSpec&, double);
+template std::vector<StepLimit> mpm_step_limits<BSplineShape>(const Lattice&, const std::vector<Body>&, const MpmSpec&, double);
+template std::vector<StepLimit> mpm_step_limits<GimpShape>(const Lattice&, const std::vector<Body>&, const MpmSpec&, double);
+template ElementSystem mpm_elements<LinearShape, PointStrain>(const Lattice&, const std::vector<Body>&);
+template ElementSystem mpm_elements<LinearShape, BBarStrain>(const Lattice&, const std::vector<Body>&);
+template ElementSystem mpm_elements<BSplineShape, PointStrain>(const Lattice&, const std::vector<Body>&);
+template ElementSystem mpm_elements<GimpShape, PointStrain>(const Lattice&, const std::vector<Body>&);
+}  // namespace testbed
