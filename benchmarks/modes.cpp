@@ -1,8 +1,8 @@
 #include "benchmarks/modes.hpp"
 
-#include "core/method_limits.hpp"
 #include "core/results.hpp"
 #include "core/spectrum.hpp"
+#include "core/step_control.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -29,14 +29,17 @@ struct Start
 
 Start run_to(double end, const Scene& scene, Solver& solver)
 {
+    StepControl clock(scene, solver);
     Start start;
-    start.dt = scene.time.dt ? *scene.time.dt : scene.time.cfl * solver.critical_time_step(scene);
     do
     {
-        solver.prepare(start.t, start.dt);
-        solver.advance(start.dt);
-        start.t = static_cast<double>(++start.steps) * start.dt;
-    } while (start.t < end * (1 - 1e-12));
+        solver.prepare(clock.t(), clock.dt());
+        solver.advance(clock.dt());
+        clock.next();
+        ++start.steps;
+    } while (clock.t() < end * (1 - 1e-12) && !(clock.follows_limit() && clock.is_at_end()));
+    start.t = clock.t();
+    start.dt = clock.dt();
     start.state = state_of(solver);
     return start;
 }
