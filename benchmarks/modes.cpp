@@ -1,8 +1,8 @@
 #include "benchmarks/modes.hpp"
 
-#include "core/method_limits.hpp"
 #include "core/results.hpp"
 #include "core/spectrum.hpp"
+#include "core/step_control.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -16,6 +16,7 @@ namespace testbed
 namespace
 {
 constexpr std::size_t most_unknowns = 3000;
+constexpr double excess = 1e-3;  ///< share of the change that may be missing in the sum of disturbances
 constexpr double hardly = 1e-3;  ///< phase below which a mode is not shown among the slowest: it is hardly felt, not slow [rad]
 
 /// The state about which the map is made, and how it was reached.
@@ -28,14 +29,17 @@ struct Start
 
 Start run_to(double end, const Scene& scene, Solver& solver)
 {
+    StepControl clock(scene, solver);
     Start start;
-    start.dt = scene.time.dt ? *scene.time.dt : scene.time.cfl * solver.critical_time_step(scene);
     do
     {
-        solver.prepare(start.t, start.dt);
-        solver.advance(start.dt);
-        start.t = static_cast<double>(++start.steps) * start.dt;
-    } while (start.t < end * (1 - 1e-12));
+        solver.prepare(clock.t(), clock.dt());
+        solver.advance(clock.dt());
+        clock.next();
+        ++start.steps;
+    } while (clock.t() < end * (1 - 1e-12) && !(clock.follows_limit() && clock.is_at_end()));
+    start.t = clock.t();
+    start.dt = clock.dt();
     start.state = state_of(solver);
     return start;
 }
@@ -137,9 +141,12 @@ std::string as_text(const Findings& f, const Scene& scene, const ModesOptions& o
         "map              of {} step{}, columns by differences of both sides; {}\n", f.steps, f.steps == 1 ? "" : "s",
         f.map.kinks == 0 ? "all are smooth"
                          : fmt::format("{} have a kink (a box or a point on a lattice line, a surface, yield): their mean", f.map.kinks));
-    if (scene.damping && scene.damping->local > 0)
-        text += "                 local damping has no derivative where a velocity or a force is zero: of a state at rest the map is that "
-                "without damping\n";
+    if (f.map.excess > excess)
+        text += fmt::format(
+            "                 WARNING: disturbances do not add up ({:.2g} of the change): a limiter, a face or local damping chooses "
+            "by their signs\n                 at this state. The modes are those of single disturbances; take a state that "
+            "deforms (--at, a velocity of the body)\n",
+            f.map.excess);
     text += fmt::format("spectral radius  {:.9f}{}\n", f.spectrum.radius,
                         f.steps == 1 ? "" : fmt::format(", {:.9f} a step", std::pow(f.spectrum.radius, 1.0 / f.steps)));
     if (f.critical)
@@ -157,8 +164,9 @@ std::string as_text(const Findings& f, const Scene& scene, const ModesOptions& o
     text += f.null.unseen == 0 ? "                 none is unseen, each moves the points\n"
                                : fmt::format("                 {} are unseen, they move no point; a step leaves {:.4g} of them\n",
                                              f.null.unseen, f.null.unseen_kept);
-    text += fmt::format("neutral          {} of the state's patterns stay as they are, {} more drift at a constant rate\n",
-                        f.spectrum.steady, f.spectrum.drifting);
+    text +=
+        fmt::format("neutral          {} of the state's patterns stay as they are, {} more drift at a constant rate, {} are forgotten\n",
+                    f.spectrum.steady, f.spectrum.drifting, f.spectrum.forgotten);
     text += fmt::format("unstable         {}\n{}", f.unstable.size(), f.unstable.empty() ? "" : table(f, f.unstable, options.top));
     text +=
         fmt::format("swinging         {}, {} first\n{}", f.swinging.size(), f.frequency ? "the nearest to the frequency" : "the slowest",
@@ -213,6 +221,7 @@ std::string as_json(const Findings& f, const Scene& scene)
     add("steps", fmt::format("{}", f.steps));
     add("unknowns", fmt::format("{}", f.map.unknowns.size()));
     add("kinks", fmt::format("{}", f.map.kinks));
+    add("excess", number(f.map.excess));
     add("spectral_radius", number(f.spectrum.radius));
     add("growth_per_step", number(std::pow(f.spectrum.radius, 1.0 / f.steps)));
     add("critical_dt", f.critical ? number(*f.critical) : "null");
@@ -224,6 +233,7 @@ std::string as_json(const Findings& f, const Scene& scene)
     add("unseen_kept", number(f.null.unseen_kept));
     add("steady", fmt::format("{}", f.spectrum.steady));
     add("drifting", fmt::format("{}", f.spectrum.drifting));
+    add("forgotten", fmt::format("{}", f.spectrum.forgotten));
     add("modes", modes.empty() ? "[]" : fmt::format("[\n    {}\n  ]", fmt::join(modes, ",\n    ")));
     return fmt::format("{{\n{}\n}}\n", fmt::join(lines, ",\n"));
 }

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <random>
 
 namespace testbed
 {
@@ -245,6 +246,23 @@ OneStepMap one_step_map(Solver& solver, const State& about, const Lattice& latti
         const Eigen::VectorXd coarse = slope(settings.difference);
         map.matrix.col(n) = 2 * slope(settings.difference / 2) - coarse;
         map.kinks += has_kink;
+    }
+    std::mt19937 random(1);
+    for (int k = 0; k < 4; ++k)
+    {
+        Eigen::VectorXd signs(count);
+        for (double& sign : signs)
+            sign = random() % 2 == 0 ? 1 : -1;
+        const auto towards = [&](double difference)
+        {
+            State all = base;
+            for (Eigen::Index n = 0; n < count; ++n)
+                all.numbers[*at[static_cast<std::size_t>(n)]] += difference * signs[n] * map.unknowns[static_cast<std::size_t>(n)].scale;
+            return unknowns(after(all));
+        };
+        const Eigen::VectorXd together = (towards(settings.difference) - towards(-settings.difference)) / (2 * settings.difference);
+        const Eigen::VectorXd sum = map.matrix * signs;
+        map.excess = std::max(map.excess, (together - sum).norm() / (sum - signs).norm());
     }
     return map;
 }

@@ -48,6 +48,9 @@ struct OneStepMap
     std::vector<Unknown> unknowns;
     Eigen::MatrixXd matrix;  ///< of changes over their scales
     std::size_t kinks = 0;   ///< columns that differ from one side to the other: the matrix has their mean
+    /// Largest difference between what all unknowns changed at once do and the sum of what each does alone, over what the step changes: not
+    /// zero at a state where limiters or local damping choose by the signs of disturbances. The matrix then is no derivative.
+    double excess = 0;
 
     std::vector<Eigen::Index> all(Unknown::Kind kind) const;
 };

@@ -11,6 +11,7 @@ namespace testbed
 namespace
 {
 using Matrix = Eigen::MatrixXd;
+constexpr double forgotten = 1e-4;  ///< an eigenvalue of a chain of zeros is the root of a difference of 1e-10
 using Eigen::Index;
 
 /// QR with pivots, and the rank: how many of them exceed the tolerance.
@@ -121,10 +122,13 @@ Spectrum spectrum(const Matrix& map, double tolerance)
     const auto values = solver.eigenvalues();
     const auto vectors = solver.eigenvectors();
     for (Index k = 0; k < values.size(); ++k)
-        if (values[k].imag() >= 0)
+        if (std::abs(1.0 + values[k]) < forgotten)
+            ++out.forgotten;
+        else if (values[k].imag() >= 0)
             out.modes.push_back({1.0 + values[k], (reduced.basis.cast<std::complex<double>>() * vectors.col(k)).normalized()});
     std::stable_sort(out.modes.begin(), out.modes.end(), [](const Mode& a, const Mode& b) { return a.growth() > b.growth(); });
-    out.radius = std::max(out.radius, out.modes.front().growth());
+    if (!out.modes.empty())
+        out.radius = std::max(out.radius, out.modes.front().growth());
     return out;
 }
 

@@ -24,10 +24,11 @@ struct Mode
 
 struct Spectrum
 {
-    std::vector<Mode> modes;   ///< without the eigenvalue 1; of a pair that with the positive phase; the largest first
-    std::size_t steady = 0;    ///< patterns that stay as they are
-    std::size_t drifting = 0;  ///< patterns with the eigenvalue 1 that change all the same, by a constant rate: a body in free flight
-    double radius = 0;         ///< the largest |eigenvalue|
+    std::vector<Mode> modes;    ///< without the eigenvalue 1; of a pair that with the positive phase; the largest first
+    std::size_t steady = 0;     ///< patterns that stay as they are
+    std::size_t drifting = 0;   ///< patterns with the eigenvalue 1 that change all the same, by a constant rate: a body in free flight
+    std::size_t forgotten = 0;  ///< eigenvalues next to 0: what a step makes anew, whatever it was; not among the modes
+    double radius = 0;          ///< the largest |eigenvalue|
 };
 
 /// Eigenvalues of a map. Those that are 1 are taken out first, stage by stage, by the rank of A - 1: with their chains a difference of

@@ -58,20 +58,21 @@ struct Case
 /// A shear with its chain, a rotation with growth, a decay: what is known of a matrix is found, turned into another basis.
 TEST(Spectrum, KnownMatrix)
 {
-    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(7, 7);
+    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(8, 8);  // the last row and column are forgotten
     a.topLeftCorner(3, 3) << 1, 2, 0, 0, 1, 0, 0, 0, 1;
     const double growth = 1.1, phase = 0.7;
     a.block(3, 3, 2, 2) << growth * std::cos(phase), -growth * std::sin(phase), growth * std::sin(phase), growth * std::cos(phase);
     a(5, 5) = 0.5;
     a(6, 6) = -0.25;
-    Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(7, 7);
-    for (int i = 0; i < 7; ++i)
-        for (int j = 0; j < 7; ++j)
+    Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(8, 8);
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j)
             basis(i, j) += 0.3 * std::sin(1 + i + 3 * j * j);
     const Eigen::MatrixXd turned = basis * a * basis.inverse();
     const Spectrum s = spectrum(turned);
     EXPECT_EQ(s.steady, 2u);
     EXPECT_EQ(s.drifting, 1u);
+    EXPECT_EQ(s.forgotten, 1u);
     ASSERT_EQ(s.modes.size(), 3u);
     EXPECT_NEAR(s.modes[0].growth(), growth, 1e-12);
     EXPECT_NEAR(s.modes[0].phase(), phase, 1e-12);
@@ -258,4 +259,13 @@ TEST(Modes, MapOverACell)
         EXPECT_NEAR(end[n], map.unknowns[static_cast<std::size_t>(n)].component * 20 * 0.0125 * wave_speed, 1e-6);
     for (const auto n : map.all(Unknown::Kind::stress))
         EXPECT_NEAR(end[n], 0, 1e-7);
+}
+
+/// Local damping takes from a force by the sign of the velocity: two disturbances are not the sum of both, and the map says so.
+TEST(Modes, WhatDoesNotAddUpIsSeen)
+{
+    Case c(block(2), "lpfdm-2000");
+    EXPECT_LT(c.map().excess, 1e-4);
+    Case damped(block(2, 0.3, "[damping]\nlocal = 0.5"), "lpfdm-2000");
+    EXPECT_GT(damped.map().excess, 0.01);
 }
