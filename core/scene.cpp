@@ -260,9 +260,9 @@ const std::vector<Variant>& variants()
         {"mpm-linear-bbar", "mpm", "linear shape functions, volumetric strain averaged over each cell, FLIP, MUSL",
          [](Scene& s) { s.mpm = {.shape = "linear", .scheme = "musl", .strain = "b_bar"}; }},
         {"mpm-bspline", "mpm", "quadratic B-splines, linear at the edges of the lattice; FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.shape = "bspline", .scheme = "musl", .strain = "four_point"}; }},
+         [](Scene& s) { s.mpm = {.shape = "bspline", .scheme = "musl", .strain = "four_point", .mass_cutoff = 1e-14}; }},
         {"mpm-cpgimp", "mpm", "contiguous-particle GIMP: each point's box stretches with it; FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.shape = "cpgimp", .scheme = "musl", .strain = "four_point"}; }},
+         [](Scene& s) { s.mpm = {.shape = "cpgimp", .scheme = "musl", .strain = "four_point", .mass_cutoff = 1e-14}; }},
         {"fem-q1", "fem", "small-strain reference, bilinear elements", [](Scene& s) { s.fem.degree = 1; }},
         {"fem-q2", "fem", "small-strain reference, biquadratic elements", [](Scene& s) { s.fem.degree = 2; }},
     };

@@ -85,8 +85,9 @@ Watched watch(const std::string& text, const std::string& method, const std::vec
     Watched w{test::load(text, method, overrides)};
     w.solver = find_variant(method).family == "mpm" ? make_mpm(w.scene) : make_lpfdm(w.scene);
     Observer observer(w.scene, *w.solver);
-    const double dt = time_step(w.scene);
-    Guards guards(w.scene, *w.solver, w.solver->critical_time_step(w.scene));
+    const double dt = time_step(w.scene, *w.solver);
+    const double critical = w.solver->critical_time_step(w.scene);
+    Guards guards(w.scene, *w.solver, critical);
     const int steps = static_cast<int>(std::ceil(w.scene.time.end / dt));
     try
     {
@@ -107,7 +108,7 @@ Watched watch(const std::string& text, const std::string& method, const std::vec
         w.diverged = true;
     }
     w.findings = guards.findings(!w.diverged);
-    w.diagnosis = diagnose(w.scene, *w.solver, {dt, w.solver->critical_time_step(w.scene), w.findings});
+    w.diagnosis = diagnose(w.scene, *w.solver, {dt, critical, w.findings});
     return w;
 }
 
@@ -143,7 +144,7 @@ TEST(Ledger, KnowsWhatDampingTakes)
 {
     for (const std::string& method : all_methods)
     {
-        const Watched w = watch(block(floor_y + sides + gravity + "[damping]\nlocal = 0.5\n", 0, 3), method, {"time.cfl=0.2"});
+        const Watched w = watch(block(floor_y + sides + gravity + "[damping]\nlocal = 0.5\n", 0, 3), method, {"time.cfl=0.04"});
         // at rest half of the work is stored, the other half was taken
         EXPECT_NEAR(w.end().damping / w.end().external, 0.5, 0.02) << method;
         EXPECT_LT(w.unexplained(), closes(method)) << method;
@@ -155,7 +156,7 @@ TEST(Ledger, KnowsWhatDampingTakes)
 TEST(Ledger, KnowsWhatHourglassControlTakes)
 {
     const std::string pattern = "velocity = [\"0.001*cos(_pi*X/0.25)*cos(_pi*Y/0.25)\", \"0\"]";
-    const Watched w = watch(block("", 1, 1, "law = \"linear_elastic\"", pattern), "lpfdm", {"lpfdm.convection=none", "time.cfl=0.1"});
+    const Watched w = watch(block("", 1, 1, "law = \"linear_elastic\"", pattern), "lpfdm", {"lpfdm.convection=none", "time.cfl=0.05"});
     const double start = w.samples[0].energy.kinetic;
     EXPECT_GT(start, 0);
     EXPECT_LT(w.end().kinetic, 0.05 * start);
@@ -184,7 +185,7 @@ TEST(Ledger, KnowsTheWorkOfLoads)
     for (const std::string method : {"lpfdm-2000", "mpm-linear", "mpm-cpgimp"})
         for (const std::string& load : std::vector{pull, force, pressure})
         {
-            const Watched w = watch(block(floor_y + sides + load), method, {"time.cfl=0.2"});
+            const Watched w = watch(block(floor_y + sides + load), method, {"time.cfl=0.04"});
             EXPECT_GT(w.end().external, 0) << method << load;
             EXPECT_LT(w.unexplained(), 5e-3) << method << load;
         }
@@ -306,7 +307,7 @@ velocity = ["RATE*(X-6)", "0"]
     const auto at_rate = [&](const std::string& rate) { return std::string(bar).replace(bar.find("RATE"), 4, rate); };
     for (const std::string method : {"lpfdm-2000", "mpm-linear"})
     {
-        const Watched w = watch(at_rate("4"), method);
+        const Watched w = watch(at_rate("4"), method, {"time.cfl=0.25"});
         EXPECT_TRUE(w.found("separated")) << method << w.codes();
         EXPECT_EQ(w.diagnosis.cause, "separation") << method;
         const Watched less = watch(at_rate("0.4"), method);

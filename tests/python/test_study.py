@@ -257,7 +257,8 @@ def test_a_seed_is_known_before_the_run(tmp_path, monkeypatch):
     bench.write('title = "A"\nscene = "scene.toml"\n[axes]\n"material.soil.random.seed" = [0, 3]\n')
     monkeypatch.setattr(study, "resolve", lambda _, c: (
         str(c.axes), {"material": [{"name": "soil", "random": {"seed": c.axes["material.soil.random.seed"]}}]}))
-    plan, _ = study.expand(read_study(tmp_path / "s.toml"), bench.testbed, bench.out, False, 1)
-    runs = [dataset.read_run(bench.out / entry["id"], entry) for entry in plan["runs"]]
+    spec = read_study(tmp_path / "s.toml")
+    entries, _, _ = study.expand(spec, spec.combinations, bench.testbed, bench.out, False, 1)
+    runs = [dataset.read_run(bench.out / entry["id"], entry) for entry in entries]
     assert [run.values["seed"] for run in runs] == [0, 3]
     assert [len(own) for own in dataset.groups(runs).values()] == [2]
