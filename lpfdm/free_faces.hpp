@@ -22,7 +22,7 @@ public:
     /// A node with less than this share of a full node's mass has no velocity of its own: what little stress it sees tells nothing of the
     /// body, and pushes it to any speed.
     static constexpr double sliver = 1e-3;
-    double full_mass = 0;  ///< of a node with four full cells [kg/m]
+    double full_mass = 0;  ///< of a node with four full cells of the lightest body [kg/m]
 
     explicit FreeFaces(std::size_t nodes) { resize(nodes); }
     void resize(std::size_t nodes)
@@ -169,7 +169,7 @@ public:
         const double larger = std::max(a, b);
         return larger > 0 ? std::max(0.0, 1 - 2 * std::min(a, b) / larger) : 0;
     }
-    std::size_t bytes() const { return 5 * xx_.capacity() * sizeof(double) + faces_.capacity() * sizeof(faces_[0]); }
+    std::size_t bytes() const { return 5 * xx_.capacity() * sizeof(double) + (faces_.capacity() + ahead_.capacity()) * sizeof(faces_[0]); }
 
 private:
     struct Layer
@@ -193,7 +193,7 @@ private:
         return sum;
     }
 
-    std::vector<double> one_sided_;          ///< 1 at nodes of faces_
+    std::vector<double> one_sided_;          ///< 1 at nodes of faces_ and ahead_
     std::vector<double> xx_, yy_, xy_, yx_;  ///< gradient of the increment at nodes
     std::vector<std::uint32_t> faces_, ahead_;
 };

@@ -180,7 +180,7 @@ public:
         return bytes_of(bodies_) + grid_.bytes() + mass_before_.capacity() * sizeof(double) + sums_.bytes() +
                (workspace_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity()) * sizeof(double) +
                cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) +
-               (weight_ ? weight_->bytes() : 0) + cell_weight_.capacity() * sizeof(double);
+               (faces_ ? faces_->bytes() : 0) + (weight_ ? weight_->bytes() : 0) + cell_weight_.capacity() * sizeof(double);
     }
     void write_state(StateWriter& writer) override { state(writer); }
     void read_state(StateReader& reader) override { state(reader); }

@@ -82,3 +82,93 @@ TEST(Gradient, ShearAndRotation)
     EXPECT_DOUBLE_EQ(spin.rotation(), 0.2);
     EXPECT_DOUBLE_EQ(spin.shear(), 0);
 }
+
+namespace
+{
+Gradient<> minus_one(const Gradient<>& f)
+{
+    return {f.xx - 1, f.yy - 1, f.xy, f.yx};
+}
+/// I + e A.
+Gradient<> deformation(double e, const Gradient<>& a)
+{
+    return {1 + e * a.xx, 1 + e * a.yy, e * a.xy, e * a.yx};
+}
+Gradient<> inverse_of(const Gradient<>& f)
+{
+    const double det = f.xx * f.yy - f.xy * f.yx;
+    return {f.yy / det, f.xx / det, -f.xy / det, -f.yx / det};
+}
+double largest(const Gradient<>& g)
+{
+    return std::max({std::abs(g.xx), std::abs(g.yy), std::abs(g.xy), std::abs(g.yx)});
+}
+constexpr StrainIncrement midpoint{0.5}, forward{0.0};
+}  // namespace
+
+/// A rotation strains nothing, whatever its angle; and its angle is right to third order. Forward it strains by the square of it.
+TEST(StrainIncrement, RotationStrainsNothing)
+{
+    for (const double angle : {0.4, -0.1, 0.01})
+    {
+        const Gradient<> g{std::cos(angle) - 1, std::cos(angle) - 1, -std::sin(angle), std::sin(angle)};
+        const Gradient<> d = midpoint.of(g), f = forward.of(g);
+        EXPECT_NEAR(d.xx, 0, 1e-16);
+        EXPECT_NEAR(d.yy, 0, 1e-16);
+        EXPECT_NEAR(d.shear(), 0, 1e-16);
+        EXPECT_NEAR(d.rotation(), angle, 0.1 * std::abs(angle * angle * angle));
+        EXPECT_NEAR(f.xx, -0.5 * angle * angle, std::pow(angle, 4));
+    }
+}
+
+/// A deformation and its inverse cancel to third order: an eighth is left at half of it, forward a quarter.
+TEST(StrainIncrement, DeformationAndInverseCancel)
+{
+    Random random(4);
+    for (int trial = 0; trial < 50; ++trial)
+    {
+        const Gradient<> a{random(-1, 1), random(-1, 1), random(-1, 1), random(-1, 1)};
+        const auto left = [&](const StrainIncrement& increment, double e)
+        {
+            const Gradient<> f = deformation(e, a);
+            return largest(increment.of(minus_one(f)) + increment.of(minus_one(inverse_of(f))));
+        };
+        EXPECT_LT(left(midpoint, 0.01), 5e-6);
+        EXPECT_LT(left(midpoint, 0.01), left(midpoint, 0.02) / 7 + 1e-9);
+        EXPECT_NEAR(left(forward, 0.02) / left(forward, 0.01), 4, 0.3);
+    }
+}
+
+/// In one direction the strain is the logarithm of the stretch, and stretch() gives the stretch, to third order.
+TEST(StrainIncrement, Logarithm)
+{
+    for (const double e : {0.02, -0.02})
+    {
+        const auto strain_error = [&](double x) { return std::abs(midpoint.of(Gradient<>{x, 0, 0, 0}).xx - std::log1p(x)); };
+        const auto stretch_error = [&](double x) { return std::abs(midpoint.stretch(midpoint.of(Gradient<>{x, 0, 0, 0}).xx) - 1 - x); };
+        EXPECT_LT(strain_error(e), 0.3 * std::abs(e * e * e));
+        EXPECT_NEAR(strain_error(e) / strain_error(e / 2), 8, 0.5);
+        EXPECT_LT(stretch_error(e), 0.3 * std::abs(e * e * e));
+        EXPECT_NEAR(stretch_error(e) / stretch_error(e / 2), 8, 0.5);
+        EXPECT_EQ(forward.of(Gradient<>{e, 0, 0, 0}).xx, e);
+        EXPECT_EQ(forward.stretch(e), 1 + e);
+    }
+}
+
+/// The trace of any increment gives the ratio of the volumes to second order; forward the first order alone.
+TEST(StrainIncrement, Volume)
+{
+    Random random(5);
+    for (int trial = 0; trial < 50; ++trial)
+    {
+        const Gradient<> a{random(-1, 1), random(-1, 1), random(-1, 1), random(-1, 1)};
+        const auto error = [&](const StrainIncrement& increment, double e)
+        {
+            const Gradient<> f = deformation(e, a);
+            return std::abs(increment.stretch(increment.of(minus_one(f)).trace()) - (f.xx * f.yy - f.xy * f.yx));
+        };
+        EXPECT_LT(error(midpoint, 0.01), 3e-6);
+        const double det = a.xx * a.yy - a.xy * a.yx;
+        EXPECT_NEAR(error(forward, 0.01), std::abs(det) * 1e-4, 1e-12);
+    }
+}
