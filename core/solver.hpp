@@ -16,7 +16,7 @@ namespace testbed
 struct MotionSums
 {
     double kinetic_energy = 0;    ///< sum of m v(t - dt/2) . v(t + dt/2) / 2 [J/m]: what is constant beside the strain energy at t
-    double kinetic_before = 0;    ///< sum of m v(t - dt/2)^2 / 2 [J/m]: never negative
+    double kinetic_before = 0;    ///< sum over nodes of m v(t - dt/2)^2 / 2 [J/m]: never negative
     Vec2 momentum{0, 0};          ///< kg/s
     double angular_momentum = 0;  ///< kg m/s, about the lattice origin
     double unbalanced = 0;        ///< norm of the nodal forces out of balance over that of the internal ones

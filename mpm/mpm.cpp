@@ -135,13 +135,12 @@ public:
         node_ops_.end_step(dt);
     }
 
-    /// The kinetic energy is that of the points: nodes see a part of it only.
+    /// The kinetic energy is that of the points: nodes see a part of it only. What they do not see moves no point, so that rest goes by
+    /// that of the nodes.
     MotionSums sums() const override
     {
         MotionSums s = nodal_sums(lattice_, nodes_, lag_, internal_);
-        const double points = point_motion().kinetic_energy;
-        s.kinetic_energy += points - s.kinetic_before;
-        s.kinetic_before = points;
+        s.kinetic_energy += point_motion().kinetic_energy - s.kinetic_before;
         return s;
     }
     PointMotion point_motion() const override
