@@ -87,6 +87,9 @@ double content_limit(const Lattice& lattice, const std::vector<Body>& bodies)
     return 2 / std::sqrt(2 * largest);
 }
 
+/// Of the isolated cell's limit. Of 135 drops of elastic blocks (2 to 4 points, nu 0 to 0.47, offsets from the lattice) none wins more than 1.6 % of the
+/// work of gravity at 0.6 of that limit, 1 does at 0.7, 8 at 0.8, 24 at 0.9, 80 at 1.05.
+constexpr double crossing_share = 2.0 / 3;
 }  // namespace
 
 template <class Shape>
@@ -101,7 +104,10 @@ std::vector<StepLimit> mpm_step_limits(const Lattice& lattice, const std::vector
         const double cell = lattice.cell_size * lattice.cell_size;
         const bool sparse = std::any_of(bodies.begin(), bodies.end(), [&](const Body& b) { return b.points.initial_volume > 0.9 * cell; });
         const double on_nodes = sparse && std::is_same_v<Shape, LinearShape> ? std::sqrt(0.5) : 1.0;
-        limits.push_back({"stiffness", isolated_cell_limit(bodies, lattice.cell_size) * factor * on_nodes});
+        const double isolated = isolated_cell_limit(bodies, lattice.cell_size) * factor;
+        limits.push_back({"stiffness", isolated * on_nodes});
+        if (std::is_same_v<Shape, LinearShape> && options.transfer != "xpic")
+            limits.push_back({"crossing", isolated * crossing_share});
     }
     double speed = 0;
     for (const Body& body : bodies)
