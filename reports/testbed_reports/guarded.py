@@ -5,6 +5,7 @@ another code, is read by a child process with limits of time and memory; what th
 never meets the damaged one in this process."""
 import contextlib
 import faulthandler
+import itertools
 import mmap
 import os
 import pickle
@@ -25,6 +26,7 @@ SPARE_MEMORY = 2 << 30
 MOST_BYTES = 512 << 20  # of such files that are kept
 
 _good = set()  # files with a checksum that holds
+_number = itertools.count()  # names of the copies, of which many may be open
 _copies = {}  # of files without a checksum: an open file in memory, or a DamagedError
 
 
@@ -124,7 +126,7 @@ def _read_all(path):
 
 def _in_memory(found):
     """A file in memory that holds what another one does."""
-    file = h5py.File.in_memory() if hasattr(h5py.File, "in_memory") else h5py.File(f"copy {id(found)}", "w", driver="core", backing_store=False)
+    file = h5py.File.in_memory() if hasattr(h5py.File, "in_memory") else h5py.File(f"copy {next(_number)}", "w", driver="core", backing_store=False)
     for name, (attributes, array) in found.items():
         node = file if name == "/" else file.create_group(name) if array is None else file.create_dataset(name, data=array)
         for key, value in attributes.items():

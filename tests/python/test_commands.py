@@ -259,7 +259,7 @@ def test_case_is_the_folder_however_the_scene_is_named(tmp_path):
 
 def test_check_says_what_the_scene_uses():
     text = run("check", COLUMN).stdout
-    for told in ("half_width_x", "local damping", "bytes per point", "critical", "c_p", "exact solution (hypoelastic)"):
+    for told in ("half_width_x", "local damping", "bytes per point", "limits           stiffness", "c_p", "exact solution (hypoelastic)"):
         assert told in text
     assert "velocity_x" not in text and "body force" not in text  # absent
     assert "velocity_x" in run("check", COLUMN, "--method", "mpm-linear").stdout

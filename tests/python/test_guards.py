@@ -50,8 +50,8 @@ def test_a_sound_run_says_so(tmp_path):
 
 @pytest.mark.parametrize("method", ["lpfdm", "lpfdm-2000", "mpm-linear", "mpm-bspline", "mpm-cpgimp"])
 def test_energy_ledger_of_a_free_oscillation(tmp_path, method):
-    done = run(SUDDEN, "--method", method, "--strict", "-o", tmp_path / "r.h5")
-    assert done.returncode == 0, done.stderr
+    done = run(SUDDEN, "--method", method, "-o", tmp_path / "r.h5")  # not strict: check warns of nu = 0.47
+    assert ": completed, sound;" in done.stderr, done.stderr
     with h5py.File(tmp_path / "r.h5") as file:
         h = {name: node[()] for name, node in file["history"].items() if isinstance(node, h5py.Dataset)}
     assert np.abs(h["numerical_energy"]).max() < 5e-3 * h["external_work"].max()
@@ -60,7 +60,7 @@ def test_energy_ledger_of_a_free_oscillation(tmp_path, method):
 
 @pytest.mark.parametrize("strict, code", [((), 0), (("--strict",), 5)])
 def test_a_suspect_run_says_so(tmp_path, strict, code):
-    done = run(COLUMN, "--set", "time.end=0.55", *strict, "-o", tmp_path / "r.h5")
+    done = run(COLUMN, "--set", "time.end=0.3", *strict, "-o", tmp_path / "r.h5")
     assert done.returncode == code, done.stderr
     assert "completed, suspect: not_at_rest" in done.stderr and "suspect: not_at_rest: it was to come to rest" in done.stderr
     root = attributes(tmp_path / "r.h5")
@@ -68,7 +68,7 @@ def test_a_suspect_run_says_so(tmp_path, strict, code):
 
 
 def test_a_quiet_suspect_run_still_says_so(tmp_path):
-    done = run(COLUMN, "--set", "time.end=0.55", "--quiet", "-o", tmp_path / "r.h5")
+    done = run(COLUMN, "--set", "time.end=0.3", "--quiet", "-o", tmp_path / "r.h5")
     assert done.returncode == 0 and done.stderr.startswith("suspect: not_at_rest: ")
 
 
