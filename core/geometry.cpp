@@ -52,6 +52,21 @@ bool contains(const BodySpec& body, const Vec2& p, double slack)
            p[1] <= (*body.max)[1] + slack;
 }
 
+std::optional<std::array<std::size_t, 2>> crossing_edges(const std::vector<Vec2>& v)
+{
+    const auto turn = [](const Vec2& a, const Vec2& b, const Vec2& c)
+    { return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]); };
+    const std::size_t n = v.size();
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = i + 1; j < n; ++j)
+        {
+            const Vec2 &a = v[i], &b = v[(i + 1) % n], &c = v[j], &d = v[(j + 1) % n];
+            if (turn(a, b, c) * turn(a, b, d) < 0 && turn(c, d, a) * turn(c, d, b) < 0)
+                return std::array{i, j};
+        }
+    return std::nullopt;
+}
+
 std::array<Vec2, 2> extent(const BodySpec& body)
 {
     if (body.shape == "box")

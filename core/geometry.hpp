@@ -3,6 +3,8 @@
 
 #include "core/scene.hpp"
 
+#include <optional>
+
 namespace testbed
 {
 /// Whether a place lies in the body's shape, or within `slack` of a box or disk [m].
@@ -10,6 +12,9 @@ bool contains(const BodySpec& body, const Vec2& place, double slack = 0);
 
 /// The corners, low and high, of the box around a body's shape [m].
 std::array<Vec2, 2> extent(const BodySpec& body);
+
+/// Two edges of a closed polygon that cross, by the numbers of their first corners, if there are any.
+std::optional<std::array<std::size_t, 2>> crossing_edges(const std::vector<Vec2>& vertices);
 
 /// Places on the outline of a body's shape: its corners, or points around a disk.
 std::vector<Vec2> outline(const BodySpec& body);

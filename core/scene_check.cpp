@@ -88,6 +88,8 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
         known = body.vertices.size() >= 3;
         if (!known)
             problems.add(key + ".vertices", "at least three corners are asked");
+        else if (const auto edges = crossing_edges(body.vertices))
+            problems.add(key + ".vertices", fmt::format("the edges after corners {} and {} cross", (*edges)[0] + 1, (*edges)[1] + 1));
     }
     if (!known)
         return;

@@ -134,6 +134,8 @@ TEST(Hardening, ShapesThatLackAPart)
 {
     expect("[[body]]\nname = \"d\"\nmaterial = \"soil\"\nshape = \"disk\"\n", "body[1].center: missing");
     expect("[[body]]\nname = \"p\"\nmaterial = \"soil\"\nshape = \"polygon\"\nvertices = [[0, 0]]\n", "at least three corners");
+    expect("[[body]]\nname = \"p\"\nmaterial = \"soil\"\nshape = \"polygon\"\nvertices = [[3, 3], [5, 5], [5, 3], [3, 5]]\n",
+           "the edges after corners 1 and 3 cross");
     expect("[[body]]\nname = \"b\"\nmaterial = \"soil\"\nshape = \"box\"\nmin = [0, 3]\n", "body[1].max: missing");
     expect("[[body]]\nname = \"d\"\nmaterial = \"soil\"\nshape = \"disk\"\ncenter = [0.5, 3]\nradius = 0\n", "must be positive");
 }
