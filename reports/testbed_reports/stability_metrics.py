@@ -10,11 +10,9 @@ from .results import TENSOR
 
 
 def total_energy(result):
-    """Kinetic + strain - external work, (M,) [J/m]; kinetic energy by the velocity of the points where the file has it, since that
-    of nodes with little mass says nothing of the body."""
-    kinetic = "kinetic_energy_points" if "kinetic_energy_points" in result.histories else "kinetic_energy"
+    """Kinetic + strain - external work, (M,) [J/m]; not the kinetic energy of the points, which is looked at in some samples only."""
     work = "external_work" if "external_work" in result.histories else "gravity_work"
-    return result.history(kinetic) + result.history("strain_energy") - result.history(work)
+    return result.history("kinetic_energy") + result.history("strain_energy") - result.history(work)
 
 
 def energy_gain(result):

@@ -347,8 +347,9 @@ def test_energy_gain_is_over_what_was_put_in(make):
     assert grade(energies(make, total, {"energy_scale": 100.0})).rows["energy_gain", "scaled"] == pytest.approx(0.15)
 
 
-def test_energy_of_points_and_all_work_count_where_they_are_given(make):
-    rows = grade(energies(make, 1e5 * TIME, {"energy_scale": 100.0}, kinetic_energy_points=100 + 30 * TIME, external_work=20 * TIME)).rows
+def test_all_work_counts_where_it_is_given_and_energy_of_points_does_not(make):
+    """The points are looked at in some samples only."""
+    rows = grade(energies(make, 100 + 30 * TIME, {"energy_scale": 100.0}, kinetic_energy_points=1e5 * TIME, external_work=20 * TIME)).rows
     assert rows["energy_gain", "scaled"] == pytest.approx(0.1)
 
 
