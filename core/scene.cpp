@@ -254,7 +254,8 @@ const std::vector<Variant>& variants()
          [](Scene& s) {
              s.lpfdm = {"point", "upwind", "extrapolate", 0.0};
          }},
-        {"lpfdm", "lpfdm", "each point has a domain, convection on both sides of the forces, hourglass control", [](Scene& s) { s.lpfdm = LpfdmSpec{}; }},
+        {"lpfdm", "lpfdm", "each point has a domain, convection on both sides of the forces, hourglass control",
+         [](Scene& s) { s.lpfdm = LpfdmSpec{}; }},
         {"mpm-linear", "mpm", "linear shape functions, strain at each point, FLIP, MUSL",
          [](Scene& s) { s.mpm = {.shape = "linear", .scheme = "musl", .strain = "four_point"}; }},
         {"mpm-linear-bbar", "mpm", "linear shape functions, volumetric strain averaged over each cell, FLIP, MUSL",

@@ -87,8 +87,9 @@ double content_limit(const Lattice& lattice, const std::vector<Body>& bodies)
     return 2 / std::sqrt(2 * largest);
 }
 
-/// Of the isolated cell's limit. Of 135 drops of elastic blocks (2 to 4 points, nu 0 to 0.47, offsets from the lattice) none wins more than 1.6 % of the
-/// work of gravity at 0.6 of that limit, 1 does at 0.7, 8 at 0.8, 24 at 0.9, 80 at 1.05; of 405 others one wins 2.1 % at 0.6.
+/// Of the isolated cell's limit. Of 135 drops of elastic blocks (2 to 4 points, nu 0 to 0.47, offsets from the lattice) none wins more
+/// than 1.6 % of the work of gravity at 0.6 of that limit, 1 does at 0.7, 8 at 0.8, 24 at 0.9, 80 at 1.05; of 405 others one wins 2.1 % at
+/// 0.6.
 constexpr double crossing_share = 0.6;
 }  // namespace
 

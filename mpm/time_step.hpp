@@ -20,7 +20,8 @@ namespace testbed
 /// factor
 ///   of 1.5 to 2.5 where cells hold 2 x 2 points or more, wherever these lie; with one point to a cell and linear shapes the sum over
 ///   points that sit on nodes asks for a factor of 1/sqrt(2). PIC's share asks for sqrt((1 + f) / 2).
-/// - crossing, for linear shapes: stress jumps to other nodes where a point crosses a line of nodes, and steps near the limit of stiffness pump
+/// - crossing, for linear shapes: stress jumps to other nodes where a point crosses a line of nodes, and steps near the limit of stiffness
+/// pump
 ///   energy with that. XPIC takes it out.
 /// - cell content, for usl: see content_limit().
 /// - motion: a point crosses at most one cell in a step.

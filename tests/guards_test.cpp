@@ -181,7 +181,8 @@ TEST(Ledger, KnowsTheWorkOfLoads)
     const std::string pull = "[[traction]]\nname = \"pull\"\nbody = \"block\"\nface = \"top\"\ntraction = [\"0\", \"100\"]\n";
     const std::string force = "[body_force]\nacceleration = [\"0\", \"1\"]\n";
     const std::string pressure = "[confinement]\npressure = 500.0\n";
-    for (const std::string method : {"lpfdm-2000", "mpm-linear", "mpm-cpgimp"})  // MPM loses (M - M_C) a^2 dt / 2 in a step: 6e-3 at cfl 0.025
+    for (const std::string method :
+         {"lpfdm-2000", "mpm-linear", "mpm-cpgimp"})  // MPM loses (M - M_C) a^2 dt / 2 in a step: 6e-3 at cfl 0.025
         for (const std::string& load : std::vector{pull, force, pressure})
         {
             const Watched w = watch(block(floor_y + sides + load), method, {"time.cfl=0.0125"});
@@ -259,8 +260,8 @@ TEST(Guards, EnergyFromNowhere)
 TEST(Guards, SpinOnTheLatticeIsNoEnergyMade)
 {
     const std::string spin = "velocity = [\"-0.5*(Y-1.25)\", \"0.5*(X-0.125)\"]";
-    const Watched w = watch(block("", 1, 4, "law = \"hypoelastic_jaumann\"", spin), "lpfdm",
-                            {"body.block.min=[0.0, 1.0]", "body.block.max=[0.25, 1.5]"});
+    const Watched w =
+        watch(block("", 1, 4, "law = \"hypoelastic_jaumann\"", spin), "lpfdm", {"body.block.min=[0.0, 1.0]", "body.block.max=[0.25, 1.5]"});
     EXPECT_EQ(w.codes(), "");
     EXPECT_GT(w.unexplained(), 0.02);
 }

@@ -173,8 +173,8 @@ TEST_P(LpfdmOracle, SameTrajectories)
     const LpfdmCase& c = GetParam();
     const Scene scene = test::load(with_gravity(), c.method, c.overrides);
     const auto solver = make_lpfdm(scene);
-    test::RefLpfdm reference{{0.5, -1, -1}, test::reference_points(scene), c.domain, c.central,
-                             scene.lpfdm.convection == "two_sided", scene.lpfdm.frontier == "arrival"};
+    test::RefLpfdm reference{{0.5, -1, -1}, test::reference_points(scene),         c.domain,
+                             c.central,     scene.lpfdm.convection == "two_sided", scene.lpfdm.frontier == "arrival"};
     // hourglass: the scene's coefficient times the fastest wave over L
     double wave_speed = 0;
     for (const Body& body : solver->bodies())
@@ -196,17 +196,18 @@ TEST_P(LpfdmOracle, SameTrajectories)
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Variants, LpfdmOracle,
-                         testing::Values(LpfdmCase{"published", "lpfdm-2000", {}, false, false},
-                                         LpfdmCase{"point_central", "lpfdm-2000", {"lpfdm.convection=central"}, false, true},
-                                         LpfdmCase{"domain_central", "lpfdm", {"lpfdm.convection=central", "lpfdm.frontier=extrapolate"}, true, true},
-                                         LpfdmCase{"domain_two_sided", "lpfdm", {}, true, true},
-                                         LpfdmCase{"two_sided_extrapolate", "lpfdm", {"lpfdm.frontier=extrapolate"}, true, true},
-                                         LpfdmCase{"point_two_sided", "lpfdm-2000", {"lpfdm.convection=two_sided", "lpfdm.frontier=arrival"}, false, true},
-                                         LpfdmCase{"domain_upwind", "lpfdm", {"lpfdm.convection=upwind"}, true, false},
-                                         LpfdmCase{"point_hourglass", "lpfdm-2000", {"lpfdm.hourglass=0.3"}, false, false},
-                                         LpfdmCase{"strong_hourglass", "lpfdm", {"lpfdm.hourglass=0.3"}, true, true}),
-                         [](const auto& info) { return std::string(info.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Variants, LpfdmOracle,
+    testing::Values(LpfdmCase{"published", "lpfdm-2000", {}, false, false},
+                    LpfdmCase{"point_central", "lpfdm-2000", {"lpfdm.convection=central"}, false, true},
+                    LpfdmCase{"domain_central", "lpfdm", {"lpfdm.convection=central", "lpfdm.frontier=extrapolate"}, true, true},
+                    LpfdmCase{"domain_two_sided", "lpfdm", {}, true, true},
+                    LpfdmCase{"two_sided_extrapolate", "lpfdm", {"lpfdm.frontier=extrapolate"}, true, true},
+                    LpfdmCase{"point_two_sided", "lpfdm-2000", {"lpfdm.convection=two_sided", "lpfdm.frontier=arrival"}, false, true},
+                    LpfdmCase{"domain_upwind", "lpfdm", {"lpfdm.convection=upwind"}, true, false},
+                    LpfdmCase{"point_hourglass", "lpfdm-2000", {"lpfdm.hourglass=0.3"}, false, false},
+                    LpfdmCase{"strong_hourglass", "lpfdm", {"lpfdm.hourglass=0.3"}, true, true}),
+    [](const auto& info) { return std::string(info.param.name); });
 
 /// Boxes reach into cells, and so to nodes, before a new bin is needed: a disk of few points flies without stress all the same.
 TEST(Frontier, MovesWithoutANewBin)

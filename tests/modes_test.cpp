@@ -231,7 +231,8 @@ TEST(Modes, CentralConvectionIsUnstableAtATrailingFace)
         {
             columns[map.unknowns[static_cast<std::size_t>(n)].node.i] += std::norm(s.modes.front().shape[n]);
         }
-        const auto most = std::max_element(columns.begin(), columns.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+        const auto most =
+            std::max_element(columns.begin(), columns.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
         return std::pair(s.radius, most->first);
     };
     const auto [radius, column] = largest(0.1 * wave_speed, "central");

@@ -220,12 +220,16 @@ TEST_P(MpmOracle, SameTrajectories)
 {
     const MpmCase& c = GetParam();
     // one modulus per body: the oracle of B-bar tells bodies apart by it
-    const Scene scene =
-        test::load(test::two_bodies() + "[gravity]\nacceleration = [0.4, -1.3]\n", c.method,
-                   {std::string("mpm.scheme=") + c.scheme, "mpm.flip=" + std::to_string(c.flip), std::string("mpm.increment=") + c.increment,
-                    "material.stiff.youngs_modulus=3e4"});
+    const Scene scene = test::load(test::two_bodies() + "[gravity]\nacceleration = [0.4, -1.3]\n", c.method,
+                                   {std::string("mpm.scheme=") + c.scheme, "mpm.flip=" + std::to_string(c.flip),
+                                    std::string("mpm.increment=") + c.increment, "material.stiff.youngs_modulus=3e4"});
     const auto solver = make_mpm(scene);
-    test::RefMpm reference{{0.5, -1, -1}, test::reference_points(scene), scene.mpm.shape, c.scheme, c.flip, scene.mpm.strain == "b_bar",
+    test::RefMpm reference{{0.5, -1, -1},
+                           test::reference_points(scene),
+                           scene.mpm.shape,
+                           c.scheme,
+                           c.flip,
+                           scene.mpm.strain == "b_bar",
                            scene.mpm.increment == "midpoint"};
     reference.least = scene.mpm.mass_cutoff * 1000 * 0.25;  // of the lighter body
     for (int n = 0; n < 40; ++n)
@@ -237,20 +241,22 @@ TEST_P(MpmOracle, SameTrajectories)
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Variants, MpmOracle,
-    testing::Values(MpmCase{"mpm-linear", "usl", 1}, MpmCase{"mpm-linear", "musl", 1}, MpmCase{"mpm-linear", "usf", 1},
-                    MpmCase{"mpm-linear", "musl", 0.9}, MpmCase{"mpm-linear-bbar", "musl", 1}, MpmCase{"mpm-linear-bbar", "usl", 1},
-                    MpmCase{"mpm-cpgimp", "musl", 1}, MpmCase{"mpm-cpgimp", "usl", 0.95}, MpmCase{"mpm-cpgimp", "usf", 1},
-                    MpmCase{"mpm-bspline", "musl", 1}, MpmCase{"mpm-bspline", "usl", 0.95}, MpmCase{"mpm-bspline", "usf", 1},
-                    MpmCase{"mpm-cpgimp", "musl", 1, "forward"}, MpmCase{"mpm-linear-bbar", "usf", 1, "forward"}),
-    [](const auto& info)
-    {
-        std::string name = std::string(info.param.method) + "_" + info.param.scheme + (info.param.flip < 1 ? "_blend" : "") +
-                           (std::string(info.param.increment) == "forward" ? "_forward" : "");
-        std::replace(name.begin(), name.end(), '-', '_');
-        return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Variants, MpmOracle,
+                         testing::Values(MpmCase{"mpm-linear", "usl", 1}, MpmCase{"mpm-linear", "musl", 1}, MpmCase{"mpm-linear", "usf", 1},
+                                         MpmCase{"mpm-linear", "musl", 0.9}, MpmCase{"mpm-linear-bbar", "musl", 1},
+                                         MpmCase{"mpm-linear-bbar", "usl", 1}, MpmCase{"mpm-cpgimp", "musl", 1},
+                                         MpmCase{"mpm-cpgimp", "usl", 0.95}, MpmCase{"mpm-cpgimp", "usf", 1},
+                                         MpmCase{"mpm-bspline", "musl", 1}, MpmCase{"mpm-bspline", "usl", 0.95},
+                                         MpmCase{"mpm-bspline", "usf", 1}, MpmCase{"mpm-cpgimp", "musl", 1, "forward"},
+                                         MpmCase{"mpm-linear-bbar", "usf", 1, "forward"}),
+                         [](const auto& info)
+                         {
+                             std::string name = std::string(info.param.method) + "_" + info.param.scheme +
+                                                (info.param.flip < 1 ? "_blend" : "") +
+                                                (std::string(info.param.increment) == "forward" ? "_forward" : "");
+                             std::replace(name.begin(), name.end(), '-', '_');
+                             return name;
+                         });
 
 TEST(Mpm, SameBitsForAnyThreads)
 {

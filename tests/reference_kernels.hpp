@@ -88,7 +88,7 @@ struct RefLpfdm
     bool domain, central;
     bool two_sided = false, arrival = false;
     double hourglass_rate = 0;
-    std::map<Key, Vec2> v{};  ///< velocity of the nodes that had mass in the step before
+    std::map<Key, Vec2> v{};      ///< velocity of the nodes that had mass in the step before
     std::map<Key, Vec2> ahead{};  ///< of nodes without mass that belong to a point's 2 x 2 cells
     std::map<Key, double> old_mass{};
     std::set<Key> faces{};
@@ -138,17 +138,15 @@ struct RefLpfdm
         return found == cells.end() ? 0 : found->second.M;
     }
     /// Share of a side that is missing: 0 while the lighter side has half of the heavier one or more.
-    static double missing(double a, double b)
-    {
-        return a == b ? 0 : std::max(0.0, 1 - 2 * std::min(a, b) / std::max(a, b));
-    }
+    static double missing(double a, double b) { return a == b ? 0 : std::max(0.0, 1 - 2 * std::min(a, b) / std::max(a, b)); }
     void find_faces(const std::map<Key, Cell>& cells, const std::map<Key, double>& m)
     {
         faces.clear();
         for (const auto& [k, mass] : m)
         {
             const auto [i, j] = k;
-            const double a = mass_of(cells, i - 1, j - 1), b = mass_of(cells, i, j - 1), c = mass_of(cells, i - 1, j), d = mass_of(cells, i, j);
+            const double a = mass_of(cells, i - 1, j - 1), b = mass_of(cells, i, j - 1), c = mass_of(cells, i - 1, j),
+                         d = mass_of(cells, i, j);
             if ((missing(a + c, b + d) > 0 && v[k][0] != 0) || (missing(a + b, c + d) > 0 && v[k][1] != 0) || mass < sliver_mass)
                 faces.insert(k);
         }
@@ -232,8 +230,10 @@ struct RefLpfdm
                         }
                     return std::pair{M, M > 0 ? (1 / M) * mean : mean};
                 };
-                const double left = mass_of(cells, i - 1, j - 1) + mass_of(cells, i - 1, j), right = mass_of(cells, i, j - 1) + mass_of(cells, i, j);
-                const double down = mass_of(cells, i - 1, j - 1) + mass_of(cells, i, j - 1), up = mass_of(cells, i - 1, j) + mass_of(cells, i, j);
+                const double left = mass_of(cells, i - 1, j - 1) + mass_of(cells, i - 1, j),
+                             right = mass_of(cells, i, j - 1) + mass_of(cells, i, j);
+                const double down = mass_of(cells, i - 1, j - 1) + mass_of(cells, i, j - 1),
+                             up = mass_of(cells, i - 1, j) + mass_of(cells, i, j);
                 if (const double part = missing(left, right); part > 0)
                 {
                     const int next = right > left ? i + 1 : i - 2;
@@ -304,7 +304,8 @@ struct RefLpfdm
         const double a = std::clamp((bx + hx) / (2 * hx), 0.0, 1.0), b = std::clamp((by + hy) / (2 * hy), 0.0, 1.0);
         const Gradient<> g = (1 - a) * (1 - b) * cell[0][0] + a * (1 - b) * cell[0][1] + (1 - a) * b * cell[1][0] + a * b * cell[1][1];
         const double X = bx * (1 + mean.xx / 2), Y = by * (1 + mean.yy / 2);
-        const double nx[] = {std::max(0.0, -X), 1 - std::abs(X), std::max(0.0, X)}, ny[] = {std::max(0.0, -Y), 1 - std::abs(Y), std::max(0.0, Y)};
+        const double nx[] = {std::max(0.0, -X), 1 - std::abs(X), std::max(0.0, X)},
+                     ny[] = {std::max(0.0, -Y), 1 - std::abs(Y), std::max(0.0, Y)};
         for (int j = 0; j < 3; ++j)
             for (int i = 0; i < 3; ++i)
             {

@@ -318,12 +318,15 @@ fix = "y"
 }  // namespace
 
 /// The error of steps that alternate by a factor of two falls with the square of the step, as that of equal steps does; it is 4/3 times as
-/// large at most, for it goes as the mean square of the steps. With MPM a mapping to points and back, C, leaves a term (1 - C) a dt of the first order
-/// between the velocity that moves points and their own, with equal steps, too: changing steps add nothing of that order.
+/// large at most, for it goes as the mean square of the steps. With MPM a mapping to points and back, C, leaves a term (1 - C) a dt of the
+/// first order between the velocity that moves points and their own, with equal steps, too: changing steps add nothing of that order.
 TEST(ChangingSteps, AreOfSecondOrder)
 {
-    const std::vector<std::pair<std::string, std::vector<std::string>>> methods{{"lpfdm", {}},      {"lpfdm-2000", {}}, {"mpm-cpgimp", {}},
-                                                                                {"mpm-linear", {}}, {"mpm-linear", {"mpm.scheme=usf"}},
+    const std::vector<std::pair<std::string, std::vector<std::string>>> methods{{"lpfdm", {}},
+                                                                                {"lpfdm-2000", {}},
+                                                                                {"mpm-cpgimp", {}},
+                                                                                {"mpm-linear", {}},
+                                                                                {"mpm-linear", {"mpm.scheme=usf"}},
                                                                                 {"mpm-bspline", {"mpm.scheme=usl"}}};
     for (const auto& [method, options] : methods)
     {
@@ -533,8 +536,9 @@ double difference(const AtRest& a, const AtRest& b)
 }  // namespace
 
 /// A contrast of 1e6 takes no more steps than none, and the state at rest is that of true masses. With LPFDM and B-splines the stiff body
-/// must not be bent into patterns that its own stiffness hardly resists: a layer, not a footing; B-splines spread the raised masses of the layer
-/// over soft nodes, too, and take 1.4 to 1.8 times the steps, by rounding. Stress summed along another path to rest differs in the order of strain.
+/// must not be bent into patterns that its own stiffness hardly resists: a layer, not a footing; B-splines spread the raised masses of the
+/// layer over soft nodes, too, and take 1.4 to 1.8 times the steps, by rounding. Stress summed along another path to rest differs in the
+/// order of strain.
 TEST(DensityScaling, ChangesNeitherTheStateAtRestNorTheSteps)
 {
     for (const std::string method : {"lpfdm", "lpfdm-2000", "mpm-linear", "mpm-linear-bbar", "mpm-cpgimp", "mpm-bspline"})

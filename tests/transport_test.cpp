@@ -507,8 +507,7 @@ double asymmetry(const std::vector<std::string>& overrides, double step)
 {
     const double E = 1e6, nu = 0.3, c = wave_speed(E, nu);
     const std::string velocity = fmt::format("[\"{0}*(X-6)*(2+Y)/6\", \"{0}*cos(X-6)\"]", 0.02 * c);
-    const Course r =
-        run(lattice(12, 14) + material(E, nu) + box({3.5, 4.1}, {8.5, 9.1}, 3, velocity), overrides, 30 / c, step / c);
+    const Course r = run(lattice(12, 14) + material(E, nu) + box({3.5, 4.1}, {8.5, 9.1}, 3, velocity), overrides, 30 / c, step / c);
     const Points& q = r.solver->bodies()[0].points;
     double most = 0;
     for (std::size_t p = 0; p < q.count; ++p)
