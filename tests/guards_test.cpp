@@ -229,7 +229,7 @@ TEST(WorkOverEnergy, IsTheIntegralAlongAStraightPath)
     }
 }
 
-/// Central convection of eq. (13) at a free face may make energy: found, not passed.
+/// Energy made beyond 2 % of the scale, and dissipation that comes back, are found; what is lost is not.
 TEST(Guards, EnergyFromNowhere)
 {
     GuardSample s;
