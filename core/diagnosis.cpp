@@ -161,7 +161,11 @@ double stress_oscillation(const std::vector<Body>& bodies, const Lattice& lattic
 
 Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& facts)
 {
+    const bool nearly_incompressible = std::any_of(scene.materials.begin(), scene.materials.end(),
+                                                   [](const MaterialSpec& material) { return material.poissons_ratio > 0.45; });
     const auto [lattice, nodes] = solver.nodes();
+    if (!lattice && found(facts, "noise") && nearly_incompressible)
+        return {"locking", scene.fem.degree == 1 ? "fem.degree=2" : ""};
     if (!lattice)
         return {};
     const Method m = method_of(scene);
@@ -176,11 +180,18 @@ Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& fac
         return {"time_step", smaller_step(scene, facts, fast / (2 * courant))};
     if (checkerboard_share(*lattice, *nodes) > pattern_rules)
         return {"null_mode", null_mode_remedy(scene, m)};
-    const bool nearly_incompressible = std::any_of(scene.materials.begin(), scene.materials.end(),
-                                                   [](const MaterialSpec& material) { return material.poissons_ratio > 0.45; });
     const double oscillation = stress_oscillation(bodies, *lattice);
-    if (m.linear && !m.b_bar && nearly_incompressible && oscillation > oscillates)
-        return {"locking", "mpm.strain=b_bar"};
+    const bool noise = found(facts, "noise");
+    if (m.is_mpm && !m.b_bar && nearly_incompressible && (noise || (m.linear && oscillation > oscillates)))
+        return {"locking", m.linear ? "mpm.strain=b_bar" : ""};
+    if (found(facts, "crossing"))
+        return {"crossing", wider_support(m)};
+    if (found(facts, "mixed_cells"))
+        return {"mixed_cells", ""};
+    if (found(facts, "drift"))
+        return {"ratchet", smaller_step(scene, facts, 0.5)};
+    if (noise)
+        return {"null_mode", null_mode_remedy(scene, m)};
     if (largest_volume_ratio(bodies) > grown)
         return {"tension", m.point_support && scene.lpfdm.volume_cap == 0 ? "lpfdm.volume_cap=2.0" : ""};
     if (m.scheme == "usl")

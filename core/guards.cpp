@@ -1,5 +1,8 @@
 #include "core/guards.hpp"
 
+#include "core/balance_guards.hpp"
+#include "core/field_guards.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -12,43 +15,6 @@ bool has_strength(const Scene& scene, const BodySpec& body)
 {
     return scene.material(body.material).has_strength();
 }
-
-/// Energy must not come from nowhere. It may be lost, as in any contact of points on a lattice.
-class EnergyGuard final : public Guard
-{
-public:
-    explicit EnergyGuard(double limit) : limit_(limit) {}
-    /// Where the motion is that of nodes, their lumped masses hold more of it than the points do, and a share that changes as a body turns
-    /// on the lattice: what is made counts as far as the points have it, too.
-    void watch(const GuardSample& s, const Solver&) override
-    {
-        if (s.is_fresh)
-        {
-            const double beside_nodes = s.point_motion.kinetic_energy - s.energy.kinetic;
-            if (!at_start_)
-                at_start_ = beside_nodes;
-            made_ = std::max(made_, s.energy.numerical + std::min(0.0, beside_nodes - *at_start_));
-        }
-        most_plastic_ = std::max(most_plastic_, s.energy.plastic);
-        made_by_law_ = std::max(made_by_law_, most_plastic_ - s.energy.plastic);
-        scale_ = s.energy_scale;
-    }
-    std::optional<Finding> finding(bool) const override
-    {
-        if (made_ > limit_ * scale_)
-            return Finding{"energy", fmt::format("the numbers made {:.3g} J/m, {:.3g} times what the loads and the start brought in", made_,
-                                                 made_ / scale_)};
-        if (made_by_law_ > limit_ * scale_)
-            return Finding{"energy", fmt::format("the stresses gave back {:.3g} J/m that had been dissipated, {:.3g} times what the loads "
-                                                 "and the start brought in",
-                                                 made_by_law_, made_by_law_ / scale_)};
-        return std::nullopt;
-    }
-
-private:
-    double limit_, made_ = 0, most_plastic_ = 0, made_by_law_ = 0, scale_ = 0;
-    std::optional<double> at_start_{};  ///< kinetic energy of the points less that of the nodes
-};
 
 class VolumeGuard final : public Guard
 {
@@ -281,11 +247,6 @@ bool is_to_rest(const Scene& scene)
     return scene.time.stop_unbalanced || (elastic && damped && ramped && !moving);
 }
 
-bool is_musl(const Scene& scene)
-{
-    return find_variant(scene.method).family == "mpm" && scene.mpm.scheme == "musl";
-}
-
 using Key = std::pair<int, int>;
 
 std::vector<Key> places(const std::vector<Bin>& bins)
@@ -359,6 +320,8 @@ Guards::Guards(const Scene& scene, const Solver& solver, double dt_critical)
     const bool small_strain = std::string(solver.kinematics()) == "small_strain";
     if (is_to_rest(scene) && !solver.is_static())
         guards_.push_back(std::make_unique<RestGuard>(scene.time.end));
+    const auto add = [&](auto&& guards) { std::move(guards.begin(), guards.end(), std::back_inserter(guards_)); };
+    add(field_guards(scene));
     if (small_strain)
     {
         guards_.push_back(std::make_unique<StrainGuard>());
@@ -366,7 +329,7 @@ Guards::Guards(const Scene& scene, const Solver& solver, double dt_critical)
     }
     const bool flows = std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodySpec& b) { return has_strength(scene, b); });
     guards_.push_back(std::make_unique<TimeStepGuard>(dt_critical));
-    guards_.push_back(std::make_unique<EnergyGuard>(is_musl(scene) ? limits::energy_gain_musl : limits::energy_gain));
+    add(balance_guards(scene));
     guards_.push_back(std::make_unique<VolumeGuard>(flows));
     guards_.push_back(std::make_unique<OutsideGuard>());
     guards_.push_back(std::make_unique<CourantGuard>(scene.grid.cell_size));
@@ -381,6 +344,13 @@ void Guards::watch(const GuardSample& sample, const Solver& solver)
     for (const auto& guard : guards_)
         guard->watch(sample, solver);
     last_ = sample;
+}
+
+void Guards::at_end(const Solver& solver)
+{
+    if (last_ && last_->points.outside == 0)
+        for (const auto& guard : guards_)
+            guard->at_end(*last_, solver);
 }
 
 std::vector<Finding> Guards::findings(bool completed) const

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,7 +25,8 @@ struct GuardSample
     bool is_fresh = true;  ///< else point_motion is that of an earlier sample, and nothing else that costs a pass is asked for
 };
 
-/// Why a run is suspect. Codes: energy, volume, outside, courant, not_at_rest, separated, contact_lost, small_strain, time_step.
+/// Why a run is suspect. Codes: energy, hourglass, momentum, drift, noise, crossing, mixed_cells, volume,
+/// outside, courant, not_at_rest, separated, contact_lost, small_strain, time_step.
 struct Finding
 {
     std::string code, sentence;
@@ -35,6 +37,8 @@ class Guard
 public:
     virtual ~Guard() = default;
     virtual void watch(const GuardSample& sample, const Solver& solver) = 0;
+    /// A longer look, once, at the last sample of a run that did not diverge.
+    virtual void at_end(const GuardSample&, const Solver&) {}
     /// What is wrong with the run up to the last sample. @param completed to the end of the scene
     virtual std::optional<Finding> finding(bool completed) const = 0;
 };
@@ -44,6 +48,15 @@ namespace limits
 {
 inline constexpr double energy_gain = 0.02;       ///< of the energy of the run
 inline constexpr double energy_gain_musl = 0.05;  ///< so, where the strain is not that of the velocity that the forces work on
+inline constexpr double hourglass = 0.1;          ///< of the energy of the run
+inline constexpr double momentum = 1e-3;          ///< change over mass times speed, where no force acts
+inline constexpr double drift = 0.01;             ///< of the mean settlement of an oscillation
+inline constexpr double stress_error = 0.15;      ///< of the stresses at rest, from their average over cells, in the energy norm
+inline constexpr double noise_share = 0.3;        ///< of the energy at the end
+inline constexpr double worth_noise = 0.01;       ///< noise of less than this share of the largest energy is not
+inline constexpr double crossed = 0.01;           ///< volume at rest in other cells than at the start
+inline constexpr double mixed = 0.01;             ///< volume in cells of two stiffnesses
+inline constexpr double contrast = 4;             ///< of stiffnesses
 inline constexpr double smallest_volume = 0.1;    ///< current over initial
 inline constexpr double largest_volume = 10;      ///< so, where the law cannot flow
 inline constexpr double courant = 1;              ///< max |v| dt / L
@@ -58,6 +71,8 @@ public:
     Guards(const Scene& scene, const Solver& solver, double dt_critical);
 
     void watch(const GuardSample& sample, const Solver& solver);
+    /// After the last sample, unless the run diverged.
+    void at_end(const Solver& solver);
     std::vector<Finding> findings(bool completed) const;
     /// What is worth a word and not wrong: parts that came off where the law may break.
     std::string note() const;

@@ -150,6 +150,12 @@ Outcome step_through(const Scene& scene, Solver& solver, StepControl& clock, Obs
     }
     progress.clear();
     out.solve_seconds = watch.seconds() - out.output_seconds;
+    if (out.status != "diverged")
+    {
+        const Stopwatch looking;
+        guards.at_end(solver);
+        out.guard_seconds += looking.seconds();
+    }
     out.findings = guards.findings(out.completed());
     out.note = guards.note();
     if (!out.sound())

@@ -1,0 +1,186 @@
+#include "core/balance_guards.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace testbed
+{
+namespace
+{
+/// Energy must not come from nowhere. It may be lost, as in any contact of points on a lattice.
+class EnergyGuard final : public Guard
+{
+public:
+    explicit EnergyGuard(double limit) : limit_(limit) {}
+    /// Where the motion is that of nodes, their lumped masses hold more of it than the points do, and a share that changes as a body turns
+    /// on the lattice: what is made counts as far as the points have it, too.
+    void watch(const GuardSample& s, const Solver&) override
+    {
+        if (s.is_fresh)
+        {
+            const double beside_nodes = s.point_motion.kinetic_energy - s.energy.kinetic;
+            if (!at_start_)
+                at_start_ = beside_nodes;
+            made_ = std::max(made_, s.energy.numerical + std::min(0.0, beside_nodes - *at_start_));
+        }
+        most_plastic_ = std::max(most_plastic_, s.energy.plastic);
+        made_by_law_ = std::max(made_by_law_, most_plastic_ - s.energy.plastic);
+        scale_ = s.energy_scale;
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (made_ > limit_ * scale_)
+            return Finding{"energy", fmt::format("the numbers made {:.3g} J/m, {:.3g} times what the loads and the start brought in", made_,
+                                                 made_ / scale_)};
+        if (made_by_law_ > limit_ * scale_)
+            return Finding{"energy", fmt::format("the stresses gave back {:.3g} J/m that had been dissipated, {:.3g} times what the loads "
+                                                 "and the start brought in",
+                                                 made_by_law_, made_by_law_ / scale_)};
+        return std::nullopt;
+    }
+
+private:
+    double limit_, made_ = 0, most_plastic_ = 0, made_by_law_ = 0, scale_ = 0;
+    std::optional<double> at_start_{};  ///< kinetic energy of the points less that of the nodes
+};
+
+/// Control of hourglass patterns is no part of the body: what it takes must stay small beside the energy of the run.
+class HourglassGuard final : public Guard
+{
+public:
+    void watch(const GuardSample& s, const Solver&) override { share_ = s.energy.hourglass / std::max(s.energy_scale, 1e-300); }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (share_ > limits::hourglass)
+            return Finding{"hourglass", fmt::format("hourglass control took {:.2g} times what the loads and the start brought in", share_)};
+        return std::nullopt;
+    }
+
+private:
+    double share_ = 0;
+};
+
+/// Where nothing acts from outside.
+class MomentumGuard final : public Guard
+{
+public:
+    void watch(const GuardSample& s, const Solver& solver) override
+    {
+        const Vec2& p = s.motion.momentum;
+        if (!at_start_)
+        {
+            at_start_ = p;
+            for (const Body& body : solver.bodies())
+                mass_ += body.points.mass * static_cast<double>(body.points.count);
+        }
+        change_ = std::max(change_, std::hypot(p[0] - (*at_start_)[0], p[1] - (*at_start_)[1]));
+        scale_ = std::max(scale_, std::sqrt(2 * mass_ * std::max(0.0, s.point_motion.kinetic_energy)));
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (change_ > limits::momentum * scale_)
+            return Finding{"momentum", fmt::format("no force acts from outside, yet the momentum changed by {:.2g} of mass times speed",
+                                                   change_ / scale_)};
+        return std::nullopt;
+    }
+
+private:
+    std::optional<Vec2> at_start_{};
+    double mass_ = 0, change_ = 0, scale_ = 0;
+};
+
+/// The mean of an elastic body's oscillation under a constant weight must stay where it is: else the strains, which balance the weight, and
+/// the displacements have parted.
+class DriftGuard final : public Guard
+{
+public:
+    explicit DriftGuard(const GravitySpec& gravity) : gravity_(gravity) {}
+    void watch(const GuardSample& s, const Solver& solver) override
+    {
+        const double g = std::hypot(gravity_.acceleration[0], gravity_.acceleration[1]);
+        if (mass_ == 0)
+            for (const Body& body : solver.bodies())
+                mass_ += body.points.mass * body.points.weight_share * static_cast<double>(body.points.count);
+        const double fall = (s.points.moment[0] * gravity_.acceleration[0] + s.points.moment[1] * gravity_.acceleration[1]) / (g * mass_);
+        at_start_ = at_start_.value_or(fall);
+        if (s.t < gravity_.ramp)
+            return;
+        t_.push_back(s.t);
+        fall_.push_back(fall - *at_start_);
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        const std::size_t tenth = t_.size() / 10;
+        const auto mean = [&](std::size_t from)
+        { return mean_of_periods(std::span(t_).subspan(from, tenth), std::span(fall_).subspan(from, tenth)); };
+        const auto first = mean(0), last = mean(t_.size() - tenth);
+        if (!first || !last || !(std::abs(*last - *first) > limits::drift * std::abs(*first)))
+            return std::nullopt;
+        return Finding{"drift",
+                       fmt::format("the mean settlement of an undamped oscillation went from {:.4g} to {:.4g} m, though nothing moves it",
+                                   *first, *last)};
+    }
+
+private:
+    GravitySpec gravity_;
+    double mass_ = 0;
+    std::optional<double> at_start_{};
+    std::vector<double> t_{}, fall_{};
+};
+
+bool is_musl(const Scene& scene)
+{
+    return find_variant(scene.method).family == "mpm" && scene.mpm.scheme == "musl";
+}
+}  // namespace
+
+std::optional<double> mean_of_periods(std::span<const double> t, std::span<const double> y)
+{
+    if (t.size() < 40)
+        return std::nullopt;
+    double average = 0;
+    for (std::size_t k = 0; k + 1 < t.size(); ++k)
+        average += 0.5 * (y[k] + y[k + 1]) * (t[k + 1] - t[k]) / (t.back() - t.front());
+    double area = 0, area_at_last = 0, first = 0, last = 0;  // of y - average since the first rise
+    std::size_t rises = 0;
+    for (std::size_t k = 0; k + 1 < t.size(); ++k)
+    {
+        const double a = y[k] - average, b = y[k + 1] - average, dt = t[k + 1] - t[k];
+        const bool rise = a < 0 && b >= 0;
+        const double at = rise ? t[k] + dt * a / (a - b) : 0;
+        if (rise)
+        {
+            area_at_last = rises == 0 ? 0 : area + 0.5 * a * (at - t[k]);
+            area = rises == 0 ? 0.5 * b * (t[k + 1] - at) : area + 0.5 * a * (at - t[k]) + 0.5 * b * (t[k + 1] - at);
+            first = rises == 0 ? at : first;
+            last = at;
+            ++rises;
+        }
+        else if (rises > 0)
+            area += 0.5 * (a + b) * dt;
+    }
+    if (rises < 6 || 8 * rises > t.size())
+        return std::nullopt;
+    return average + area_at_last / (last - first);
+}
+
+std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene)
+{
+    std::vector<std::unique_ptr<Guard>> guards;
+    const bool is_loaded = !scene.tractions.empty() || scene.body_force || scene.confinement;
+    const bool is_held = !scene.boundaries.empty() || !scene.walls.empty();
+    const bool is_damped = scene.damping && scene.damping->local > 0;
+    const bool flows =
+        std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodySpec& b) { return scene.material(b.material).has_strength(); });
+    guards.push_back(std::make_unique<EnergyGuard>(is_musl(scene) ? limits::energy_gain_musl : limits::energy_gain));
+    if (find_variant(scene.method).family == "lpfdm" && scene.lpfdm.hourglass > 0)
+        guards.push_back(std::make_unique<HourglassGuard>());
+    if (!is_loaded && !is_held && !scene.gravity)
+        guards.push_back(std::make_unique<MomentumGuard>());
+    if (!is_loaded && is_held && !is_damped && !flows && scene.walls.empty() && scene.gravity &&
+        std::hypot(scene.gravity->acceleration[0], scene.gravity->acceleration[1]) > 0)
+        guards.push_back(std::make_unique<DriftGuard>(*scene.gravity));
+    return guards;
+}
+}  // namespace testbed

@@ -1,0 +1,14 @@
+#pragma once
+/// Guards over the balance sheets of a run: energy, momentum, and a settlement that nothing makes.
+
+#include "core/guards.hpp"
+
+namespace testbed
+{
+/// Mean over whole periods of a record that swings about it, by the times at which it rises through its average.
+/// @param t, y the record, in order of time @returns nothing with less than five periods, or less than eight samples in each
+std::optional<double> mean_of_periods(std::span<const double> t, std::span<const double> y);
+
+/// energy, hourglass, momentum, drift: as far as the scene has what they balance.
+std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene);
+}  // namespace testbed

@@ -1,0 +1,296 @@
+#include "core/field_guards.hpp"
+
+#include "core/point_sums.hpp"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <map>
+
+namespace testbed
+{
+namespace
+{
+/// Values at the nodes that a body's points touch, on the smallest box of cells around them.
+class NodeAverage
+{
+public:
+    NodeAverage(const Points& q, const Vec2& origin, double cell_size) : q_(q), origin_(origin), cell_size_(cell_size)
+    {
+        CellBox box = no_cells;
+        for (std::size_t p = 0; p < q.count; ++p)
+        {
+            const auto [i, j] = cell(p);
+            box.extend({i, j, i + 1, j + 1});
+        }
+        i0_ = box.i0;
+        j0_ = box.j0;
+        stride_ = static_cast<std::size_t>(box.i1 - box.i0) + 1;
+        nodes_ = stride_ * (static_cast<std::size_t>(box.j1 - box.j0) + 1);
+    }
+    /// A body in parts far from each other is not worth the memory of all between them.
+    bool is_compact() const { return nodes_ < 64 * (q_.count + 1024); }
+
+    /// Each point's own value less the average about it. @param value (point)
+    template <class Value>
+    std::vector<double> difference(Value&& value) const
+    {
+        std::vector<double> sum(nodes_, 0.0), volume(nodes_, 0.0), rest(q_.count);
+        for (std::size_t p = 0; p < q_.count; ++p)
+            at_corners(p,
+                       [&](std::size_t n, double weight)
+                       {
+                           sum[n] += weight * q_.current_volume(p) * value(p);
+                           volume[n] += weight * q_.current_volume(p);
+                       });
+        for (std::size_t p = 0; p < q_.count; ++p)
+        {
+            rest[p] = value(p);
+            at_corners(p, [&](std::size_t n, double weight) { rest[p] -= volume[n] > 0 ? weight * sum[n] / volume[n] : 0; });
+        }
+        return rest;
+    }
+
+private:
+    std::pair<int, int> cell(std::size_t p) const
+    {
+        return {static_cast<int>(std::floor((q_.x[p] - origin_[0]) / cell_size_)),
+                static_cast<int>(std::floor((q_.y[p] - origin_[1]) / cell_size_))};
+    }
+    template <class F>
+    void at_corners(std::size_t p, F&& f) const
+    {
+        const auto [i, j] = cell(p);
+        const double a = (q_.x[p] - origin_[0]) / cell_size_ - i, b = (q_.y[p] - origin_[1]) / cell_size_ - j;
+        const std::size_t n = static_cast<std::size_t>(i - i0_) + static_cast<std::size_t>(j - j0_) * stride_;
+        f(n, (1 - a) * (1 - b));
+        f(n + 1, a * (1 - b));
+        f(n + stride_, (1 - a) * b);
+        f(n + stride_ + 1, a * b);
+    }
+
+    const Points& q_;
+    Vec2 origin_;
+    double cell_size_;
+    int i0_ = 0, j0_ = 0;
+    std::size_t stride_ = 0, nodes_ = 0;
+};
+
+double total_mass(const std::vector<Body>& bodies)
+{
+    double mass = 0;
+    for (const Body& body : bodies)
+        mass += body.points.mass * static_cast<double>(body.points.count);
+    return mass;
+}
+
+bool is_static(const GuardSample& s)
+{
+    return s.point_motion.kinetic_energy < limits::at_rest * s.points.strain_energy;
+}
+
+/// Stresses at rest that are noise, from locking, null modes or points that cross, or of too few cells; motion that is nothing but noise.
+/// Motion counts in the frame of supports and walls, without any in that of the centre of mass.
+class NoiseGuard final : public Guard
+{
+public:
+    explicit NoiseGuard(const Scene& scene) : is_free_(scene.boundaries.empty() && scene.walls.empty()), lattice_(make_lattice(scene.grid))
+    {
+        const bool fem = find_variant(scene.method).family == "fem";
+        mesh_ = scene.grid.cell_size / (fem ? std::pow(2.0, scene.fem.refinements) : 1.0);
+    }
+    void watch(const GuardSample& s, const Solver& solver) override
+    {
+        if (s.is_fresh)
+            most_ = std::max(most_, energy(s, solver));
+    }
+    void at_end(const GuardSample& s, const Solver& solver) override
+    {
+        const auto& p = s.motion.momentum;
+        const double mass = total_mass(solver.bodies());
+        const Vec2 frame = is_free_ ? Vec2{p[0] / mass, p[1] / mass} : Vec2{0, 0};
+        const Unresolved rest = unresolved_energy(solver.bodies(), lattice_, mesh_,
+                                                  [&](std::size_t b, std::size_t k)
+                                                  {
+                                                      const Vec2 v = solver.velocity(b, k);
+                                                      return Vec2{v[0] - frame[0], v[1] - frame[1]};
+                                                  });
+        const double now = energy(s, solver), noise = rest.stress + rest.velocity;
+        if (is_static(s))
+            error_ = std::sqrt(rest.stress / std::max(s.points.strain_energy, 1e-300));
+        else if (noise > limits::worth_noise * most_)
+            share_ = noise / std::max(now, 1e-300);
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (error_ > limits::stress_error)
+            return Finding{"noise", fmt::format("the stresses at rest differ by {:.2g} of themselves from their average over neighbouring "
+                                                "cells (in energy): noise, or too few cells",
+                                                error_)};
+        if (share_ > limits::noise_share)
+            return Finding{"noise",
+                           fmt::format("{:.0f} % of the energy is at the end in patterns that the lattice does not resolve", 100 * share_)};
+        return std::nullopt;
+    }
+
+private:
+    double energy(const GuardSample& s, const Solver& solver) const
+    {
+        const auto& p = s.motion.momentum;
+        const double carried = is_free_ ? 0.5 * (p[0] * p[0] + p[1] * p[1]) / total_mass(solver.bodies()) : 0;
+        return std::max(0.0, s.point_motion.kinetic_energy - carried) + s.points.strain_energy;
+    }
+
+    bool is_free_;
+    Lattice lattice_;
+    double mesh_, most_ = 0, error_ = 0, share_ = 0;
+};
+
+using CellKey = std::pair<int, int>;
+
+CellKey cell_of(const Lattice& lattice, const Points& q, std::size_t p)
+{
+    return {static_cast<int>(std::floor((q.x[p] - lattice.origin[0]) / lattice.cell_size + bin_tolerance)),
+            static_cast<int>(std::floor((q.y[p] - lattice.origin[1]) / lattice.cell_size + bin_tolerance))};
+}
+
+/// Points that belong to one cell as a whole carry their stress along when they cross a lattice line, and the nodal force jumps. What came
+/// to rest in other cells than it started in is wrong from row to row.
+class CrossingGuard final : public Guard
+{
+public:
+    explicit CrossingGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)) {}
+    void watch(const GuardSample&, const Solver& solver) override
+    {
+        if (!at_start_.empty())
+            return;
+        for (const Body& body : solver.bodies())
+        {
+            std::vector<CellKey>& cells = at_start_.emplace_back(body.points.count);
+            for (std::size_t p = 0; p < body.points.count; ++p)
+                cells[body.points.id[p]] = cell_of(lattice_, body.points, p);
+        }
+    }
+    void at_end(const GuardSample& s, const Solver& solver) override
+    {
+        if (!is_static(s))
+            return;
+        double crossed = 0;
+        for (std::size_t b = 0; b < at_start_.size(); ++b)
+        {
+            const Points& q = solver.bodies()[b].points;
+            for (std::size_t p = 0; p < q.count; ++p)
+                crossed += cell_of(lattice_, q, p) != at_start_[b][q.id[p]] ? q.current_volume(p) : 0;
+        }
+        share_ = crossed / s.points.volume;
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (share_ > limits::crossed)
+            return Finding{"crossing",
+                           fmt::format("points that hold {:.2g} of the volume came to rest in other cells than they started in; each "
+                                       "crossing of a lattice line made the force jump",
+                                       share_)};
+        return std::nullopt;
+    }
+
+private:
+    Lattice lattice_;
+    std::vector<std::vector<CellKey>> at_start_;  ///< by body and id
+    double share_ = 0;
+};
+
+/// Cells that hold points of a stiff and of a soft body have one strain for both.
+class MixedCellsGuard final : public Guard
+{
+public:
+    explicit MixedCellsGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)) {}
+    void watch(const GuardSample&, const Solver&) override {}
+    void at_end(const GuardSample& s, const Solver& solver) override
+    {
+        if (!is_static(s))
+            return;
+        struct Cell
+        {
+            double volume = 0, softest = std::numeric_limits<double>::infinity(), stiffest = 0;
+        };
+        std::map<CellKey, Cell> cells;
+        for (const Body& body : solver.bodies())
+        {
+            const double modulus = moduli(body.material).constrained();
+            for (std::size_t p = 0; p < body.points.count; ++p)
+            {
+                Cell& cell = cells[cell_of(lattice_, body.points, p)];
+                cell.volume += body.points.current_volume(p);
+                cell.softest = std::min(cell.softest, modulus);
+                cell.stiffest = std::max(cell.stiffest, modulus);
+            }
+        }
+        double mixed = 0;
+        for (const auto& [place, cell] : cells)
+            if (cell.stiffest > limits::contrast * cell.softest)
+            {
+                mixed += cell.volume;
+                contrast_ = std::max(contrast_, cell.stiffest / cell.softest);
+            }
+        share_ = mixed / s.points.volume;
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (share_ > limits::mixed)
+            return Finding{"mixed_cells",
+                           fmt::format("cells that hold {:.2g} of the volume share points of bodies whose stiffness differs {:.3g} "
+                                       "times: they have one strain for both",
+                                       share_, contrast_)};
+        return std::nullopt;
+    }
+
+private:
+    Lattice lattice_;
+    double share_ = 0, contrast_ = 0;
+};
+}  // namespace
+
+Unresolved unresolved_energy(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size,
+                             const std::function<Vec2(std::size_t, std::size_t)>& velocity)
+{
+    Unresolved total;
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+    {
+        const Points& q = bodies[b].points;
+        const ElasticModuli m = moduli(bodies[b].material);
+        const NodeAverage average(q, lattice.origin, cell_size);
+        if (!average.is_compact())
+            continue;
+        const auto sxx = average.difference([&](std::size_t p) { return q.sxx[p]; }),
+                   syy = average.difference([&](std::size_t p) { return q.syy[p]; }),
+                   sxy = average.difference([&](std::size_t p) { return q.sxy[p]; });
+        const auto vx = average.difference([&](std::size_t p) { return velocity(b, p)[0]; }),
+                   vy = average.difference([&](std::size_t p) { return velocity(b, p)[1]; });
+        for (std::size_t p = 0; p < q.count; ++p)
+        {
+            const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0, szz = m.poissons_ratio() * (sxx[p] + syy[p]);
+            total.stress += q.current_volume(p) * elastic_energy_density(m, {sxx[p], syy[p], sxy[p]}, szz) / softer;
+            total.velocity += 0.5 * q.mass * (vx[p] * vx[p] + vy[p] * vy[p]);
+        }
+    }
+    return total;
+}
+
+std::vector<std::unique_ptr<Guard>> field_guards(const Scene& scene)
+{
+    std::vector<std::unique_ptr<Guard>> guards;
+    const auto may_flow = [&](const BodySpec& body) { return scene.material(body.material).has_strength(); };
+    if (std::any_of(scene.bodies.begin(), scene.bodies.end(), may_flow))
+        return guards;
+    guards.push_back(std::make_unique<NoiseGuard>(scene));
+    const std::string family = find_variant(scene.method).family;
+    if (family == "fem")
+        return guards;
+    if (family == "mpm" ? scene.mpm.shape == "linear" : scene.lpfdm.support == "point")
+        guards.push_back(std::make_unique<CrossingGuard>(scene));
+    if (scene.bodies.size() > 1)
+        guards.push_back(std::make_unique<MixedCellsGuard>(scene));
+    return guards;
+}
+}  // namespace testbed
