@@ -162,26 +162,21 @@ public:
     explicit CrossingGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)) {}
     void watch(const GuardSample&, const Solver& solver) override
     {
-        if (!at_start_.empty())
-            return;
-        for (const Body& body : solver.bodies())
-        {
-            std::vector<CellKey>& cells = at_start_.emplace_back(body.points.count);
-            for (std::size_t p = 0; p < body.points.count; ++p)
-                cells[body.points.id[p]] = cell_of(lattice_, body.points, p);
-        }
+        if (at_start_.empty())
+            for_each_point(solver,
+                           [&](const Points& q, std::size_t p)
+                           {
+                               at_start_.resize(std::max(at_start_.size(), std::size_t{q.id[p]} + 1));
+                               at_start_[q.id[p]] = cell_of(lattice_, q, p);
+                           });
     }
     void at_end(const GuardSample& s, const Solver& solver) override
     {
         if (!is_static(s))
             return;
         double crossed = 0;
-        for (std::size_t b = 0; b < at_start_.size(); ++b)
-        {
-            const Points& q = solver.bodies()[b].points;
-            for (std::size_t p = 0; p < q.count; ++p)
-                crossed += cell_of(lattice_, q, p) != at_start_[b][q.id[p]] ? q.current_volume(p) : 0;
-        }
+        for_each_point(solver, [&](const Points& q, std::size_t p)
+                       { crossed += cell_of(lattice_, q, p) != at_start_[q.id[p]] ? q.current_volume(p) : 0; });
         share_ = crossed / s.points.volume;
     }
     std::optional<Finding> finding(bool) const override
@@ -195,8 +190,16 @@ public:
     }
 
 private:
+    template <class F>
+    static void for_each_point(const Solver& solver, F&& f)
+    {
+        for (const Body& body : solver.bodies())
+            for (std::size_t p = 0; p < body.points.count; ++p)
+                f(body.points, p);
+    }
+
     Lattice lattice_;
-    std::vector<std::vector<CellKey>> at_start_;  ///< by body and id
+    std::vector<CellKey> at_start_;  ///< by id, which counts on from body to body
     double share_ = 0;
 };
 
