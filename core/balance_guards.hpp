@@ -6,7 +6,8 @@
 namespace testbed
 {
 /// Mean over whole periods of a record that swings about it, by the times at which it rises through its average.
-/// @param t, y the record, in order of time @returns nothing with less than five periods, or less than eight samples in each
+/// @param t, y the record, in order of time @returns nothing with less than five periods, or less than eight samples in each and a thousand
+/// in all
 std::optional<double> mean_of_periods(std::span<const double> t, std::span<const double> y);
 
 /// energy, hourglass, momentum, drift: as far as the scene has what they balance.

@@ -17,19 +17,23 @@ class NodeAverage
 public:
     NodeAverage(const Points& q, const Vec2& origin, double cell_size) : q_(q), origin_(origin), cell_size_(cell_size)
     {
-        CellBox box = no_cells;
+        Vec2 low{q.x[0], q.y[0]}, high = low;
         for (std::size_t p = 0; p < q.count; ++p)
         {
-            const auto [i, j] = cell(p);
-            box.extend({i, j, i + 1, j + 1});
+            low = {std::min(low[0], q.x[p]), std::min(low[1], q.y[p])};
+            high = {std::max(high[0], q.x[p]), std::max(high[1], q.y[p])};
         }
-        i0_ = box.i0;
-        j0_ = box.j0;
-        stride_ = static_cast<std::size_t>(box.i1 - box.i0) + 1;
-        nodes_ = stride_ * (static_cast<std::size_t>(box.j1 - box.j0) + 1);
+        const double room = ((high[0] - low[0]) / cell_size + 2) * ((high[1] - low[1]) / cell_size + 2);
+        is_compact_ = room < 64.0 * static_cast<double>(q.count + 1024);
+        if (!is_compact_)
+            return;
+        i0_ = static_cast<int>(std::floor((low[0] - origin[0]) / cell_size));
+        j0_ = static_cast<int>(std::floor((low[1] - origin[1]) / cell_size));
+        stride_ = static_cast<std::size_t>((high[0] - low[0]) / cell_size) + 3;
+        nodes_ = stride_ * (static_cast<std::size_t>((high[1] - low[1]) / cell_size) + 3);
     }
     /// A body in parts far from each other is not worth the memory of all between them.
-    bool is_compact() const { return nodes_ < 64 * (q_.count + 1024); }
+    bool is_compact() const { return is_compact_; }
 
     /// Each point's own value less the average about it. @param value (point)
     template <class Value>
@@ -74,6 +78,7 @@ private:
     double cell_size_;
     int i0_ = 0, j0_ = 0;
     std::size_t stride_ = 0, nodes_ = 0;
+    bool is_compact_ = true;
 };
 
 double total_mass(const std::vector<Body>& bodies)
@@ -86,7 +91,7 @@ double total_mass(const std::vector<Body>& bodies)
 
 bool is_static(const GuardSample& s)
 {
-    return s.point_motion.kinetic_energy < limits::at_rest * s.points.strain_energy;
+    return s.motion.kinetic_before < limits::is_static * s.points.strain_energy;
 }
 
 /// Stresses at rest that are noise, from locking, null modes or points that cross, or of too few cells; motion that is nothing but noise.
@@ -106,7 +111,7 @@ public:
     }
     void at_end(const GuardSample& s, const Solver& solver) override
     {
-        const auto& p = s.motion.momentum;
+        const auto& p = s.point_motion.momentum;
         const double mass = total_mass(solver.bodies());
         const Vec2 frame = is_free_ ? Vec2{p[0] / mass, p[1] / mass} : Vec2{0, 0};
         const Unresolved rest = unresolved_energy(solver.bodies(), lattice_, mesh_,
@@ -136,7 +141,7 @@ public:
 private:
     double energy(const GuardSample& s, const Solver& solver) const
     {
-        const auto& p = s.motion.momentum;
+        const auto& p = s.point_motion.momentum;
         const double carried = is_free_ ? 0.5 * (p[0] * p[0] + p[1] * p[1]) / total_mass(solver.bodies()) : 0;
         return std::max(0.0, s.point_motion.kinetic_energy - carried) + s.points.strain_energy;
     }
@@ -150,8 +155,9 @@ using CellKey = std::pair<int, int>;
 
 CellKey cell_of(const Lattice& lattice, const Points& q, std::size_t p)
 {
-    return {static_cast<int>(std::floor((q.x[p] - lattice.origin[0]) / lattice.cell_size + bin_tolerance)),
-            static_cast<int>(std::floor((q.y[p] - lattice.origin[1]) / lattice.cell_size + bin_tolerance))};
+    const auto line = [&](double x, std::size_t k)
+    { return static_cast<int>(std::clamp(std::floor((x - lattice.origin[k]) / lattice.cell_size + bin_tolerance), -1e9, 1e9)); };
+    return {line(q.x[p], 0), line(q.y[p], 1)};
 }
 
 /// Points that belong to one cell as a whole carry their stress along when they cross a lattice line, and the nodal force jumps. What came

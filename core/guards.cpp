@@ -348,7 +348,7 @@ void Guards::watch(const GuardSample& sample, const Solver& solver)
 
 void Guards::at_end(const Solver& solver)
 {
-    if (last_ && last_->points.outside == 0)
+    if (last_)
         for (const auto& guard : guards_)
             guard->at_end(*last_, solver);
 }

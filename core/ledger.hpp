@@ -14,6 +14,7 @@ namespace testbed
 struct EnergyBalance
 {
     double kinetic = 0, elastic = 0;                 ///< stored now
+    double gravity = 0;                              ///< a part of external, at the nodes
     double external = 0;                             ///< came in: gravity, supports and walls, tractions, body force, confinement
     double damping = 0, hourglass = 0, plastic = 0;  ///< taken away
     double numerical = 0;  ///< what is stored and taken away beyond what came in: made by the numbers, lost by them if negative
@@ -42,6 +43,7 @@ public:
         if (!work)
             return b;
         const double pressed = confinement_ * (volume_ - points.volume);
+        b.gravity = work->gravity;
         b.external = work->gravity + work->restraints + work->loads + pressed;
         b.damping = work->damping;
         b.hourglass = work->hourglass;

@@ -133,7 +133,8 @@ const GuardSample& Observer::sample(double t, double dt, bool fresh)
     const auto work = solver_.work();
     const double plastic = work && !work->of_strain ? plastic_.add(solver_.bodies()) : 0;
     last_ = {t,      dt,    ledger_.at(motion.kinetic_energy, state, work, plastic), 0,
-             motion, state, fresh ? solver_.point_motion() : last_.point_motion,     fresh};
+             motion, state, fresh ? solver_.point_motion() : last_.point_motion,     gravity_work_,
+             fresh};
     last_.energy_scale = ledger_.scale();
     guard_seconds_ += watch.seconds();
     add(history_, "time", "s", t);

@@ -47,6 +47,7 @@ struct PointMotion
 {
     double kinetic_energy = 0;  ///< J/m
     double speed = 0;           ///< largest [m/s]
+    Vec2 momentum{0, 0};        ///< kg/s
 };
 
 /// @param velocity (body, point) -> Vec2
@@ -55,19 +56,18 @@ PointMotion point_motion_of(const std::vector<Body>& bodies, Velocity&& velocity
 {
     PointMotion motion;
     double square = 0;
-    std::vector<double> squares;  // a velocity may have to be interpolated: once is enough
+    std::vector<Vec2> v;  // a velocity may have to be interpolated: once is enough
     for (std::size_t b = 0; b < bodies.size(); ++b)
     {
         const Points& q = bodies[b].points;
-        squares.resize(q.count);
-        parallel_for(q.count,
-                     [&](std::size_t p)
-                     {
-                         const Vec2 v = velocity(b, p);
-                         squares[p] = v[0] * v[0] + v[1] * v[1];
-                     });
-        motion.kinetic_energy += 0.5 * q.mass * ordered_sum<1>(q.count, [&](std::size_t p) { return std::array{squares[p]}; })[0];
-        square = std::max(square, parallel_max(q.count, [&](std::size_t p) { return squares[p]; }));
+        v.resize(q.count);
+        parallel_for(q.count, [&](std::size_t p) { v[p] = velocity(b, p); });
+        const auto squared = [&](std::size_t p) { return v[p][0] * v[p][0] + v[p][1] * v[p][1]; };
+        const auto s = ordered_sum<3>(q.count, [&](std::size_t p) { return std::array{squared(p), v[p][0], v[p][1]}; });
+        motion.kinetic_energy += 0.5 * q.mass * s[0];
+        motion.momentum[0] += q.mass * s[1];
+        motion.momentum[1] += q.mass * s[2];
+        square = std::max(square, parallel_max(q.count, squared));
     }
     motion.speed = std::sqrt(square);
     return motion;

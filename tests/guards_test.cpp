@@ -1,12 +1,15 @@
 #include "core/guards.hpp"
 
+#include "core/balance_guards.hpp"
 #include "core/diagnosis.hpp"
+#include "core/field_guards.hpp"
 #include "core/observer.hpp"
 #include "lpfdm/lpfdm.hpp"
 #include "mpm/mpm.hpp"
 #include "scenes.hpp"
 
 #include <map>
+#include <numbers>
 
 namespace testbed
 {
@@ -325,6 +328,129 @@ velocity = ["RATE*(X-6)", "0"]
         const Watched less = watch(at_rate("0.4"), method);
         EXPECT_FALSE(less.found("separated")) << method;
     }
+}
+
+/// The mean over whole periods does not know where the record begins and ends; a slow or short one says nothing.
+TEST(Guards, MeanOfPeriods)
+{
+    std::vector<double> t, y;
+    for (int k = 0; k < 400; ++k)
+    {
+        t.push_back(0.1 * k);
+        y.push_back(3 + 2 * std::sin(1.7 * t.back() + 0.4));
+    }
+    ASSERT_TRUE(mean_of_periods(t, y));
+    EXPECT_NEAR(*mean_of_periods(t, y), 3, 2e-3);
+    EXPECT_FALSE(mean_of_periods(std::span(t).first(100), std::span(y).first(100)));
+}
+
+/// What the average over cells leaves of a wave of n cells along x is ((1 - cos(2 pi / n)) / 3)^2 of its energy.
+TEST(Guards, UnresolvedEnergy)
+{
+    const Scene scene = test::load(block("", 1, 0.5, "law = \"linear_elastic\"", ""), "mpm-linear",
+                                   {"grid.size=[34.0, 3.0]", "body.block.max=[32.0, 2.0]", "body.block.points_per_cell=4"});
+    const auto solver = make_mpm(scene);
+    const Lattice lattice = make_lattice(scene.grid);
+    const auto share = [&](double cells)
+    {
+        double all = 0;
+        const auto wave = [&](std::size_t b, std::size_t p) {
+            return Vec2{std::cos(2 * std::numbers::pi * solver->bodies()[b].points.x[p] / (0.25 * cells)), 0};
+        };
+        const Points& q = solver->bodies()[0].points;
+        for (std::size_t p = 0; p < q.count; ++p)
+            all += 0.5 * q.mass * wave(0, p)[0] * wave(0, p)[0];
+        return unresolved_energy(solver->bodies(), lattice, 0.25, wave).velocity / all;
+    };
+    for (const double n : {4.0, 8.0, 16.0})
+        EXPECT_NEAR(share(n) / std::pow((1 - std::cos(2 * std::numbers::pi / n)) / 3, 2), 1, 0.25) << n;
+    EXPECT_GT(share(2), 0.4);
+    EXPECT_EQ(unresolved_energy(solver->bodies(), lattice, 0.25, [](std::size_t, std::size_t) { return Vec2{1, 2}; }).stress, 0);
+    EXPECT_LT(unresolved_energy(solver->bodies(), lattice, 0.25, [](std::size_t, std::size_t) { return Vec2{1, 2}; }).velocity, 1e-20);
+}
+
+TEST(Guards, MomentumHourglassGravityDrift)
+{
+    const auto codes = [](const std::string& more, auto&& change, int samples = 2)
+    {
+        const Scene scene = test::load(block(more), "lpfdm");
+        const auto solver = make_lpfdm(scene);
+        solver->prepare(0, 1e-4);
+        Guards guards(scene, *solver, 1);
+        for (int k = 0; k < samples; ++k)
+        {
+            GuardSample s;
+            s.t = k;
+            s.energy_scale = s.points.smallest = s.points.largest = 1;
+            s.point_motion.kinetic_energy = 0.5;  // of 1000 kg/m: mass times speed is 31.6 kg/s
+            change(s, k);
+            guards.watch(s, *solver);
+        }
+        std::string all;
+        for (const Finding& f : guards.findings(true))
+            all += f.code;
+        return all;
+    };
+    EXPECT_EQ(codes("", [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.015 * k; }), "");
+    EXPECT_EQ(codes("", [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.017 * k; }), "momentum");
+    EXPECT_EQ(codes(floor_y, [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.017 * k; }), "");
+    EXPECT_EQ(codes("", [](GuardSample& s, int) { s.energy.hourglass = 0.09; }), "");
+    EXPECT_EQ(codes("", [](GuardSample& s, int) { s.energy.hourglass = 0.11; }), "hourglass");
+    EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1.009 * k, s.gravity_work = k; }), "");
+    EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1.011 * k, s.gravity_work = k; }), "gravity_work");
+    const auto swing = [](double drift)  // of a mass of 1000 kg/m that falls by 0.1 m in the mean
+    { return [drift](GuardSample& s, int k) { s.points.moment[1] = -1000 * (0.1 * (1 - std::cos(0.5 * k)) + 0.1 * drift * k / 2000); }; };
+    EXPECT_EQ(codes(floor_y + gravity, swing(0.008), 2000), "");
+    EXPECT_EQ(codes(floor_y + gravity, swing(0.02), 2000), "drift");
+    EXPECT_EQ(codes(floor_y + gravity + "[damping]\nlocal = 0.1\n", swing(0.02), 2000), "");
+}
+
+/// A block that bulges under its weight on a rough floor, nearly incompressible: a strain at each point locks, one in each cell does not.
+TEST(Guards, LockedStressIsNoise)
+{
+    const std::string rough = "[[boundary]]\nname = \"floor\"\nwhere = \"y <= 0\"\nfix = \"xy\"\n[damping]\nlocal = 0.5\n";
+    const std::vector<std::string> nu{"material.soft.poissons_ratio=0.499", "grid.cell_size=0.125", "time.end=1.0"};
+    const Watched locked = watch(block(rough + gravity, 0, 2), "mpm-linear", nu, 50);
+    EXPECT_TRUE(locked.found("noise")) << locked.codes();
+    EXPECT_EQ(locked.diagnosis.cause, "locking");
+    EXPECT_EQ(locked.diagnosis.remedy, "mpm.strain=b_bar");
+    EXPECT_EQ(watch(block(rough + gravity, 0, 2), "mpm-linear-bbar", nu, 50).codes(), "");
+}
+
+/// The pattern without strain is all of the motion, and nothing takes it away, in flight as at rest.
+TEST(Guards, HourglassPatternIsNoise)
+{
+    for (const std::string frame : {"0", "5"})
+    {
+        const std::string pattern = "velocity = [\"" + frame + " + 1e-5*cos(_pi*X/0.25)*cos(_pi*Y/0.25)\", \"0\"]";
+        const Watched w = watch(block("", 1, 0.1, "law = \"hypoelastic_jaumann\"", pattern), "lpfdm-2000");
+        EXPECT_TRUE(w.found("noise")) << frame << w.codes();
+        EXPECT_EQ(w.diagnosis.cause, "null_mode") << frame;
+    }
+}
+
+/// A column that settles by a tenth: whole rows cross lattice lines.
+TEST(Guards, CrossingUnderLoad)
+{
+    const std::string weight = "[gravity]\nacceleration = [0.0, -27.0]\n[damping]\nlocal = 0.5\n";
+    const Watched w = watch(block(floor_y + sides + weight, 0, 2), "mpm-linear", {}, 50);
+    EXPECT_TRUE(w.found("crossing")) << w.codes();
+    EXPECT_EQ(w.diagnosis.cause, "crossing");
+    EXPECT_EQ(watch(block(floor_y + sides + weight, 0, 2), "mpm-cpgimp", {}, 50).codes(), "");
+}
+
+/// A stiff body that sinks into the cells of a soft one.
+TEST(Guards, MixedCells)
+{
+    const std::string weight = "[gravity]\nacceleration = [0.0, -15.0]\n[damping]\nlocal = 0.5\n";
+    const auto top = [](const std::string& E)
+    {
+        return "[[material]]\nname = \"top\"\ndensity = 1000.0\npoissons_ratio = 0.3\nlaw = \"hypoelastic_jaumann\"\nyoungs_modulus = " +
+               E +
+               "\n[[body]]\nname = \"top\"\nmaterial = \"top\"\nshape = \"box\"\nmin = [0.0, 1.0]\nmax = [1.0, 1.5]\npoints_per_cell = 3\n";
+    };
+    EXPECT_TRUE(watch(block(floor_y + sides + weight + top("1e6"), 0, 2), "lpfdm", {}, 50).found("mixed_cells"));
+    EXPECT_FALSE(watch(block(floor_y + sides + weight + top("3e5"), 0, 2), "lpfdm", {}, 50).found("mixed_cells"));
 }
 
 TEST(Guards, NotAtRest)
