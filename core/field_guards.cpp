@@ -122,7 +122,7 @@ public:
                                                   });
         const double now = energy(s, solver), noise = rest.stress + rest.velocity;
         if (is_static(s))
-            error_ = std::sqrt(rest.stress / std::max(s.points.strain_energy, 1e-300));
+            error_ = rest.stress_share;
         else if (noise > limits::worth_noise * most_)
             share_ = noise / std::max(now, 1e-300);
     }
@@ -130,7 +130,7 @@ public:
     {
         if (error_ > limits::stress_error)
             return Finding{"noise", fmt::format("the stresses at rest differ by {:.2g} of themselves from their average over neighbouring "
-                                                "cells (in energy): noise, or too few cells",
+                                                "cells: noise, or too few cells",
                                                 error_)};
         if (share_ > limits::noise_share)
             return Finding{"noise",
@@ -264,6 +264,8 @@ Unresolved unresolved_energy(const std::vector<Body>& bodies, const Lattice& lat
                              const std::function<Vec2(std::size_t, std::size_t)>& velocity)
 {
     Unresolved total;
+    const auto square = [](double xx, double yy, double zz, double xy) { return xx * xx + yy * yy + zz * zz + 2 * xy * xy; };
+    double all = 0, rest = 0;
     for (std::size_t b = 0; b < bodies.size(); ++b)
     {
         const Points& q = bodies[b].points;
@@ -279,10 +281,13 @@ Unresolved unresolved_energy(const std::vector<Body>& bodies, const Lattice& lat
         for (std::size_t p = 0; p < q.count; ++p)
         {
             const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0, szz = m.poissons_ratio() * (sxx[p] + syy[p]);
+            all += q.current_volume(p) * square(q.sxx[p], q.syy[p], out_of_plane_stress(m, q, p), q.sxy[p]);
+            rest += q.current_volume(p) * square(sxx[p], syy[p], szz, sxy[p]);
             total.stress += q.current_volume(p) * elastic_energy_density(m, {sxx[p], syy[p], sxy[p]}, szz) / softer;
             total.velocity += 0.5 * q.mass * (vx[p] * vx[p] + vy[p] * vy[p]);
         }
     }
+    total.stress_share = all > 0 ? std::sqrt(rest / all) : 0;
     return total;
 }
 

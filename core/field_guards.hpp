@@ -5,10 +5,11 @@
 
 namespace testbed
 {
-/// Energy of what a field differs by from its average over neighbouring cells [J/m].
+/// What the fields differ by from their average over neighbouring cells.
 struct Unresolved
 {
-    double stress = 0, velocity = 0;
+    double stress = 0, velocity = 0;  ///< energies [J/m]
+    double stress_share = 0;          ///< of the stress itself, in the L2 norm: in energy, pressures count for nothing near nu = 1/2
 };
 
 /// Points to nodes by volume, nodes to points, with bilinear shape functions and for each body alone: the recovered field of
