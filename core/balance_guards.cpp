@@ -50,18 +50,21 @@ public:
     void watch(const GuardSample& s, const Solver&) override
     {
         apart_ = std::max(apart_, std::abs(s.energy.gravity - s.gravity_work));
-        most_ = std::max(most_, std::abs(s.gravity_work));
+        scale_ = s.energy_scale;
     }
     std::optional<Finding> finding(bool) const override
     {
-        if (apart_ > limit_ * most_)
-            return Finding{"gravity_work",
-                           fmt::format("the work of gravity at the nodes and on the points differs by {:.2g} of it", apart_ / most_)};
+        if (apart_ > limit_ * scale_)
+            return Finding{
+                "gravity_work",
+                fmt::format(
+                    "the work of gravity at the nodes and on the points differs by {:.2g} times what the loads and the start brought in",
+                    apart_ / scale_)};
         return std::nullopt;
     }
 
 private:
-    double limit_, apart_ = 0, most_ = 0;
+    double limit_, apart_ = 0, scale_ = 0;
 };
 
 /// Control of hourglass patterns is no part of the body: what it takes must stay small beside the energy of the run.

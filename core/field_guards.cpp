@@ -123,8 +123,8 @@ public:
         const double now = energy(s, solver), noise = rest.stress + rest.velocity;
         if (is_static(s))
             error_ = rest.stress_share;
-        else if (noise > limits::worth_noise * most_)
-            share_ = noise / std::max(now, 1e-300);
+        else if (noise > limits::worth_noise * most_)  // a bouncing body is still where it turns
+            share_ = noise / std::max(is_free_ ? now : most_, 1e-300);
     }
     std::optional<Finding> finding(bool) const override
     {

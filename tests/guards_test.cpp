@@ -396,8 +396,8 @@ TEST(Guards, MomentumHourglassGravityDrift)
     EXPECT_EQ(codes(floor_y, [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.017 * k; }), "");
     EXPECT_EQ(codes("", [](GuardSample& s, int) { s.energy.hourglass = 0.09; }), "");
     EXPECT_EQ(codes("", [](GuardSample& s, int) { s.energy.hourglass = 0.11; }), "hourglass");
-    EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1.009 * k, s.gravity_work = k; }), "");
-    EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1.011 * k, s.gravity_work = k; }), "gravity_work");
+    EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1 + 0.009 * k, s.gravity_work = 1; }), "");
+    EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1 + 0.011 * k, s.gravity_work = 1; }), "gravity_work");
     const auto swing = [](double drift)  // of a mass of 1000 kg/m that falls by 0.1 m in the mean
     { return [drift](GuardSample& s, int k) { s.points.moment[1] = -1000 * (0.1 * (1 - std::cos(0.5 * k)) + 0.1 * drift * k / 2000); }; };
     EXPECT_EQ(codes(floor_y + gravity, swing(0.008), 2000), "");
