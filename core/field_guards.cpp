@@ -24,7 +24,8 @@ public:
             high = {std::max(high[0], q.x[p]), std::max(high[1], q.y[p])};
         }
         const double room = ((high[0] - low[0]) / cell_size + 2) * ((high[1] - low[1]) / cell_size + 2);
-        is_compact_ = room < 64.0 * static_cast<double>(q.count + 1024);
+        const double far = std::max({std::abs(low[0]), std::abs(low[1]), std::abs(high[0]), std::abs(high[1])}) / cell_size;
+        is_compact_ = room < 64.0 * static_cast<double>(q.count + 1024) && far < 1e9;
         if (!is_compact_)
             return;
         i0_ = static_cast<int>(std::floor((low[0] - origin[0]) / cell_size));
