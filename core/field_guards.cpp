@@ -124,8 +124,8 @@ public:
         const double now = energy(s, solver), noise = rest.stress + rest.velocity;
         if (is_static(s))
             error_ = rest.stress_share;
-        else if (noise > limits::worth_noise * most_)  // a bouncing body is still where it turns
-            share_ = noise / std::max(is_free_ ? now : most_, 1e-300);
+        else if (is_free_ && noise > limits::worth_noise * most_)  // after a blow on a wall it is no error of the method
+            share_ = noise / std::max(now, 1e-300);
     }
     std::optional<Finding> finding(bool) const override
     {
