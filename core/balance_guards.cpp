@@ -49,7 +49,7 @@ public:
     explicit GravityGuard(bool flows) : limit_(flows ? limits::gravity_work_flow : limits::gravity_work) {}
     void watch(const GuardSample& s, const Solver&) override
     {
-        apart_ = std::max(apart_, std::abs(s.energy.gravity - s.gravity_work));
+        apart_ = std::max(apart_, std::abs(s.energy.gravity - s.gravity_work) - s.gravity_work_error);
         scale_ = s.energy_scale;
     }
     std::optional<Finding> finding(bool) const override
@@ -87,17 +87,12 @@ private:
 class MomentumGuard final : public Guard
 {
 public:
-    void watch(const GuardSample& s, const Solver& solver) override
+    void watch(const GuardSample& s, const Solver&) override
     {
         const Vec2& p = s.motion.momentum;
-        if (!at_start_)
-        {
-            at_start_ = p;
-            for (const Body& body : solver.bodies())
-                mass_ += body.points.mass * static_cast<double>(body.points.count);
-        }
+        at_start_ = at_start_.value_or(p);
         change_ = std::max(change_, std::hypot(p[0] - (*at_start_)[0], p[1] - (*at_start_)[1]));
-        scale_ = std::max(scale_, std::sqrt(2 * mass_ * std::max(0.0, s.point_motion.kinetic_energy)));
+        scale_ = std::max(scale_, std::sqrt(2 * s.point_motion.mass * std::max(0.0, s.point_motion.kinetic_energy)));
     }
     std::optional<Finding> finding(bool) const override
     {
@@ -109,7 +104,7 @@ public:
 
 private:
     std::optional<Vec2> at_start_{};
-    double mass_ = 0, change_ = 0, scale_ = 0;
+    double change_ = 0, scale_ = 0;
 };
 
 /// The mean of an elastic body's oscillation under a constant weight must stay where it is: else the strains, which balance the weight, and
@@ -118,13 +113,11 @@ class DriftGuard final : public Guard
 {
 public:
     explicit DriftGuard(const GravitySpec& gravity) : gravity_(gravity) {}
-    void watch(const GuardSample& s, const Solver& solver) override
+    void watch(const GuardSample& s, const Solver&) override
     {
         const double g = std::hypot(gravity_.acceleration[0], gravity_.acceleration[1]);
-        if (mass_ == 0)
-            for (const Body& body : solver.bodies())
-                mass_ += body.points.mass * body.points.weight_share * static_cast<double>(body.points.count);
-        const double fall = (s.points.moment[0] * gravity_.acceleration[0] + s.points.moment[1] * gravity_.acceleration[1]) / (g * mass_);
+        const double fall =
+            (s.points.moment[0] * gravity_.acceleration[0] + s.points.moment[1] * gravity_.acceleration[1]) / (g * s.points.mass);
         at_start_ = at_start_.value_or(fall);
         if (s.t < gravity_.ramp)
             return;
@@ -146,11 +139,9 @@ public:
 
 private:
     GravitySpec gravity_;
-    double mass_ = 0;
     std::optional<double> at_start_{};
     std::vector<double> t_{}, fall_{};
 };
-
 }  // namespace
 
 std::optional<double> mean_of_periods(std::span<const double> t, std::span<const double> y)
@@ -190,16 +181,14 @@ std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene)
     const bool is_loaded = !scene.tractions.empty() || scene.body_force || scene.confinement;
     const bool is_held = !scene.boundaries.empty() || !scene.walls.empty();
     const bool is_damped = scene.damping && scene.damping->local > 0;
-    const bool flows =
-        std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodySpec& b) { return scene.material(b.material).has_strength(); });
     guards.push_back(std::make_unique<EnergyGuard>());
     if (scene.gravity)
-        guards.push_back(std::make_unique<GravityGuard>(flows));
+        guards.push_back(std::make_unique<GravityGuard>(scene.may_flow()));
     if (find_variant(scene.method).family == "lpfdm" && scene.lpfdm.hourglass > 0)
         guards.push_back(std::make_unique<HourglassGuard>());
     if (!is_loaded && !is_held && !scene.gravity)
         guards.push_back(std::make_unique<MomentumGuard>());
-    if (!is_loaded && is_held && !is_damped && !flows && scene.walls.empty() && scene.gravity &&
+    if (!is_loaded && is_held && !is_damped && !scene.may_flow() && scene.walls.empty() && scene.gravity &&
         std::hypot(scene.gravity->acceleration[0], scene.gravity->acceleration[1]) > 0)
         guards.push_back(std::make_unique<DriftGuard>(*scene.gravity));
     return guards;

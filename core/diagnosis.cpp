@@ -164,10 +164,9 @@ Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& fac
     const bool nearly_incompressible = std::any_of(scene.materials.begin(), scene.materials.end(),
                                                    [](const MaterialSpec& material) { return material.poissons_ratio > 0.45; });
     const auto [lattice, nodes] = solver.nodes();
-    if (!lattice && found(facts, "noise") && nearly_incompressible)
-        return {"locking", scene.fem.degree == 1 ? "fem.degree=2" : ""};
-    if (!lattice)
-        return {};
+    if (!lattice)  // the FEM reference
+        return found(facts, "noise") && nearly_incompressible ? Diagnosis{"locking", scene.fem.degree == 1 ? "fem.degree=2" : ""}
+                                                              : Diagnosis{};
     const Method m = method_of(scene);
     const auto& bodies = solver.bodies();
     if (found(facts, "time_step"))

@@ -82,12 +82,21 @@ private:
     bool is_compact_ = true;
 };
 
-double total_mass(const std::vector<Body>& bodies)
+/// f(body, point, its stress less the average about it, the out-of-plane part of that) for elastic bodies.
+template <class F>
+void for_each_unresolved(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size, F&& f)
 {
-    double mass = 0;
     for (const Body& body : bodies)
-        mass += body.points.mass * static_cast<double>(body.points.count);
-    return mass;
+    {
+        const Points& q = body.points;
+        const NodeAverage average(q, lattice.origin, cell_size);
+        if (!average.is_compact())
+            continue;
+        const auto rest = [&](const Field<double>& s) { return average.difference([&](std::size_t p) { return s[p]; }); };
+        const auto sxx = rest(q.sxx), syy = rest(q.syy), sxy = rest(q.sxy);
+        for (std::size_t p = 0; p < q.count; ++p)
+            f(body, p, SymTensor<>{sxx[p], syy[p], sxy[p]}, moduli(body.material).poissons_ratio() * (sxx[p] + syy[p]));
+    }
 }
 
 bool is_static(const GuardSample& s)
@@ -105,27 +114,28 @@ public:
         const bool fem = find_variant(scene.method).family == "fem";
         mesh_ = scene.grid.cell_size / (fem ? std::pow(2.0, scene.fem.refinements) : 1.0);
     }
-    void watch(const GuardSample& s, const Solver& solver) override
+    void watch(const GuardSample& s, const Solver&) override
     {
         if (s.is_fresh)
-            most_ = std::max(most_, energy(s, solver));
+            most_ = std::max(most_, energy(s));
     }
     void at_end(const GuardSample& s, const Solver& solver) override
     {
-        const auto& p = s.point_motion.momentum;
-        const double mass = total_mass(solver.bodies());
-        const Vec2 frame = is_free_ ? Vec2{p[0] / mass, p[1] / mass} : Vec2{0, 0};
-        const Unresolved rest = unresolved_energy(solver.bodies(), lattice_, mesh_,
-                                                  [&](std::size_t b, std::size_t k)
-                                                  {
-                                                      const Vec2 v = solver.velocity(b, k);
-                                                      return Vec2{v[0] - frame[0], v[1] - frame[1]};
-                                                  });
-        const double now = energy(s, solver), noise = rest.stress + rest.velocity;
         if (is_static(s))
-            error_ = rest.stress_share;
-        else if (is_free_ && noise > limits::worth_noise * most_)  // after a blow on a wall it is no error of the method
-            share_ = noise / std::max(now, 1e-300);
+            error_ = stress_error(solver.bodies(), lattice_, mesh_);
+        else if (is_free_)  // after a blow on a wall it is no error of the method
+        {
+            const Vec2& p = s.point_motion.momentum;
+            const Vec2 frame{p[0] / s.point_motion.mass, p[1] / s.point_motion.mass};
+            const double noise = unresolved_energy(solver.bodies(), lattice_, mesh_,
+                                                   [&](std::size_t b, std::size_t k)
+                                                   {
+                                                       const Vec2 v = solver.velocity(b, k);
+                                                       return Vec2{v[0] - frame[0], v[1] - frame[1]};
+                                                   });
+            if (noise > limits::worth_noise * most_)
+                share_ = noise / std::max(energy(s), 1e-300);
+        }
     }
     std::optional<Finding> finding(bool) const override
     {
@@ -140,10 +150,10 @@ public:
     }
 
 private:
-    double energy(const GuardSample& s, const Solver& solver) const
+    double energy(const GuardSample& s) const
     {
         const auto& p = s.point_motion.momentum;
-        const double carried = is_free_ ? 0.5 * (p[0] * p[0] + p[1] * p[1]) / total_mass(solver.bodies()) : 0;
+        const double carried = is_free_ ? 0.5 * (p[0] * p[0] + p[1] * p[1]) / s.point_motion.mass : 0;
         return std::max(0.0, s.point_motion.kinetic_energy - carried) + s.points.strain_energy;
     }
 
@@ -215,7 +225,6 @@ class MixedCellsGuard final : public Guard
 {
 public:
     explicit MixedCellsGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)) {}
-    void watch(const GuardSample&, const Solver&) override {}
     void at_end(const GuardSample& s, const Solver& solver) override
     {
         if (!is_static(s))
@@ -261,42 +270,43 @@ private:
 };
 }  // namespace
 
-Unresolved unresolved_energy(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size,
-                             const std::function<Vec2(std::size_t, std::size_t)>& velocity)
+double stress_error(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size)
 {
-    Unresolved total;
     const auto square = [](double xx, double yy, double zz, double xy) { return xx * xx + yy * yy + zz * zz + 2 * xy * xy; };
     double all = 0, rest = 0;
+    for_each_unresolved(bodies, lattice, cell_size,
+                        [&](const Body& body, std::size_t p, const SymTensor<>& r, double szz)
+                        {
+                            const Points& q = body.points;
+                            const double V = q.current_volume(p);
+                            all += V * square(q.sxx[p], q.syy[p], out_of_plane_stress(moduli(body.material), q, p), q.sxy[p]);
+                            rest += V * square(r.xx, r.yy, szz, r.xy);
+                        });
+    return all > 0 ? std::sqrt(rest / all) : 0;
+}
+
+double unresolved_energy(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size,
+                         const std::function<Vec2(std::size_t, std::size_t)>& velocity)
+{
+    double total = 0;
+    for_each_unresolved(bodies, lattice, cell_size,
+                        [&](const Body& body, std::size_t p, const SymTensor<>& r, double szz)
+                        {
+                            const double softer = body.points.stiffness.active() ? body.points.stiffness[p] : 1.0;
+                            total += body.points.current_volume(p) * elastic_energy_density(moduli(body.material), r, szz) / softer;
+                        });
     for (std::size_t b = 0; b < bodies.size(); ++b)
-    {
-        const Points& q = bodies[b].points;
-        const ElasticModuli m = moduli(bodies[b].material);
-        const NodeAverage average(q, lattice.origin, cell_size);
-        if (!average.is_compact())
-            continue;
-        const auto sxx = average.difference([&](std::size_t p) { return q.sxx[p]; }),
-                   syy = average.difference([&](std::size_t p) { return q.syy[p]; }),
-                   sxy = average.difference([&](std::size_t p) { return q.sxy[p]; });
-        const auto vx = average.difference([&](std::size_t p) { return velocity(b, p)[0]; }),
-                   vy = average.difference([&](std::size_t p) { return velocity(b, p)[1]; });
-        for (std::size_t p = 0; p < q.count; ++p)
-        {
-            const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0, szz = m.poissons_ratio() * (sxx[p] + syy[p]);
-            all += q.current_volume(p) * square(q.sxx[p], q.syy[p], out_of_plane_stress(m, q, p), q.sxy[p]);
-            rest += q.current_volume(p) * square(sxx[p], syy[p], szz, sxy[p]);
-            total.stress += q.current_volume(p) * elastic_energy_density(m, {sxx[p], syy[p], sxy[p]}, szz) / softer;
-            total.velocity += 0.5 * q.mass * (vx[p] * vx[p] + vy[p] * vy[p]);
-        }
-    }
-    total.stress_share = all > 0 ? std::sqrt(rest / all) : 0;
+        if (const NodeAverage average(bodies[b].points, lattice.origin, cell_size); average.is_compact())
+            for (const std::size_t k : {0, 1})
+                for (const double rest : average.difference([&](std::size_t p) { return velocity(b, p)[k]; }))
+                    total += 0.5 * bodies[b].points.mass * rest * rest;
     return total;
 }
 
 std::vector<std::unique_ptr<Guard>> field_guards(const Scene& scene)
 {
     std::vector<std::unique_ptr<Guard>> guards;
-    const auto may_flow = [&](const BodySpec& body) { return scene.material(body.material).has_strength(); };
-    if (std::any_of(scene.bodies.begin(), scene.bodies.end(), may_flow))
+    if (scene.may_flow())
         return guards;
     guards.push_back(std::make_unique<NoiseGuard>(scene));
     const std::string family = find_variant(scene.method).family;

@@ -240,11 +240,10 @@ private:
 /// Whether the scene is meant to end at rest: it says so, or elastic bodies under gravity that grows slowly are damped.
 bool is_to_rest(const Scene& scene)
 {
-    const bool elastic = std::none_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodySpec& b) { return has_strength(scene, b); });
     const bool moving = std::any_of(scene.walls.begin(), scene.walls.end(), [](const WallSpec& w) { return w.velocity.has_value(); });
     const bool damped = scene.damping && scene.damping->local > 0;
     const bool ramped = scene.gravity && scene.gravity->ramp > 0 && scene.gravity->ramp < scene.time.end;
-    return scene.time.stop_unbalanced || (elastic && damped && ramped && !moving);
+    return scene.time.stop_unbalanced || (!scene.may_flow() && damped && ramped && !moving);
 }
 
 using Key = std::pair<int, int>;
@@ -327,10 +326,9 @@ Guards::Guards(const Scene& scene, const Solver& solver, double dt_critical)
         guards_.push_back(std::make_unique<StrainGuard>());
         return;
     }
-    const bool flows = std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodySpec& b) { return has_strength(scene, b); });
     guards_.push_back(std::make_unique<TimeStepGuard>(dt_critical));
     add(balance_guards(scene));
-    guards_.push_back(std::make_unique<VolumeGuard>(flows));
+    guards_.push_back(std::make_unique<VolumeGuard>(scene.may_flow()));
     guards_.push_back(std::make_unique<OutsideGuard>());
     guards_.push_back(std::make_unique<CourantGuard>(scene.grid.cell_size));
     guards_.push_back(std::make_unique<ContactGuard>(scene));

@@ -22,8 +22,8 @@ struct GuardSample
     MotionSums motion;        ///< of the nodes
     PointSums points;
     PointMotion point_motion;
-    double gravity_work = 0;  ///< on the points [J/m]
-    bool is_fresh = true;     ///< else point_motion is that of an earlier sample, and nothing else that costs a pass is asked for
+    double gravity_work = 0, gravity_work_error = 0;  ///< on the points, and the most that its trapezoids may miss of a ramp [J/m]
+    bool is_fresh = true;  ///< else point_motion is that of an earlier sample, and nothing else that costs a pass is asked for
 };
 
 /// Why a run is suspect. Codes: energy, gravity_work, hourglass, momentum, drift, noise, crossing, mixed_cells, volume,
@@ -37,7 +37,7 @@ class Guard
 {
 public:
     virtual ~Guard() = default;
-    virtual void watch(const GuardSample& sample, const Solver& solver) = 0;
+    virtual void watch(const GuardSample&, const Solver&) {}
     /// A longer look, once, at the last sample of a run that did not diverge.
     virtual void at_end(const GuardSample&, const Solver&) {}
     /// What is wrong with the run up to the last sample. @param completed to the end of the scene

@@ -21,18 +21,13 @@ std::vector<Vec2> initial_positions(const Scene& scene)
     return all;
 }
 
-bool has_strength(const Scene& scene)
-{
-    return std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                       [&](const BodySpec& body) { return scene.material(body.material).has_strength(); });
-}
 }  // namespace
 
 Observer::Observer(const Scene& scene, const Solver& solver)
     : scene_(scene),
       solver_(solver),
       lattice_(make_lattice(scene.grid)),
-      ledger_(has_strength(scene), scene.confinement ? scene.confinement->pressure : 0)
+      ledger_(scene.may_flow(), scene.confinement ? scene.confinement->pressure : 0)
 {
     const Constants constants = scene.expression_constants();
     if (const auto found = scene.exact.find(solver.kinematics()); found != scene.exact.end())
@@ -111,8 +106,11 @@ std::array<double, 3> Observer::exact_displacement(const Place& at) const
 double Observer::gravity_work(double t, const Vec2& moment)
 {
     const double f = 0.5 * (gravity_->factor(last_time_) + gravity_->factor(t));
+    double fall = 0;
     for (std::size_t k = 0; k < 2; ++k)
-        gravity_work_ += f * gravity_->acceleration[k] * (moment[k] - last_moment_[k]);
+        fall += gravity_->acceleration[k] * (moment[k] - last_moment_[k]);
+    gravity_work_ += f * fall;
+    gravity_work_error_ += 0.5 * std::abs((gravity_->factor(t) - gravity_->factor(last_time_)) * fall);
     last_time_ = t;
     last_moment_ = moment;
     return gravity_work_;
@@ -132,8 +130,15 @@ const GuardSample& Observer::sample(double t, double dt, bool fresh)
     const Stopwatch watch;
     const auto work = solver_.work();
     const double plastic = work && !work->of_strain ? plastic_.add(solver_.bodies()) : 0;
-    last_ = {t,      dt,    ledger_.at(motion.kinetic_energy, state, work, plastic), 0,
-             motion, state, fresh ? solver_.point_motion() : last_.point_motion,     gravity_work_,
+    last_ = {t,
+             dt,
+             ledger_.at(motion.kinetic_energy, state, work, plastic),
+             0,
+             motion,
+             state,
+             fresh ? solver_.point_motion() : last_.point_motion,
+             gravity_work_,
+             gravity_work_error_,
              fresh};
     last_.energy_scale = ledger_.scale();
     guard_seconds_ += watch.seconds();

@@ -86,7 +86,7 @@ private:
     Ledger ledger_;
     PlasticWork plastic_;
     GuardSample last_;
-    double gravity_work_ = 0, last_time_ = 0, guard_seconds_ = 0;
+    double gravity_work_ = 0, gravity_work_error_ = 0, last_time_ = 0, guard_seconds_ = 0;
     Vec2 last_moment_;
 };
 }  // namespace testbed

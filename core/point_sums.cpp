@@ -58,6 +58,7 @@ PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice)
         total.strain_energy += s[0];
         total.elastic_work += s[1];
         total.volume += s[2];
+        total.mass += mass * static_cast<double>(q.count);
         total.moment[0] += s[3];
         total.moment[1] += s[4];
         total.outside += s[5];

@@ -13,7 +13,8 @@ struct PointSums
     double elastic_work = 0;   ///< what it takes to get there: the law adds up increments on a volume that changes [J/m]
     double max_stress = 0;     ///< largest component in the plane [Pa]
     double volume = 0;         ///< [m^2]
-    Vec2 moment{0, 0};         ///< sum of m x [kg]
+    double mass = 0;           ///< that has weight [kg/m]
+    Vec2 moment{0, 0};         ///< sum of it times x [kg]
     double smallest = std::numeric_limits<double>::infinity(), largest = 0;  ///< current over initial volume
     double outside = 0;                                                      ///< points that are not on the lattice
 };

@@ -150,6 +150,11 @@ const BodySpec& Scene::body(const std::string& name) const
     return *std::find_if(bodies.begin(), bodies.end(), [&](const auto& b) { return b.name == name; });
 }
 
+bool Scene::may_flow() const
+{
+    return std::any_of(bodies.begin(), bodies.end(), [&](const BodySpec& body) { return material(body.material).has_strength(); });
+}
+
 Constants Scene::expression_constants() const
 {
     Constants all = constants;

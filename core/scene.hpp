@@ -378,6 +378,8 @@ struct Scene
     std::string case_name() const { return std::filesystem::absolute(path).lexically_normal().parent_path().filename().string(); }
     const MaterialSpec& material(const std::string& name) const;
     const BodySpec& body(const std::string& name) const;
+    /// Whether the law of some body has a strength, so that it may flow or break.
+    bool may_flow() const;
     /// Constants with L, as expressions see them.
     Constants expression_constants() const;
 };

@@ -48,6 +48,7 @@ struct PointMotion
     double kinetic_energy = 0;  ///< J/m
     double speed = 0;           ///< largest [m/s]
     Vec2 momentum{0, 0};        ///< kg/s
+    double mass = 0;            ///< kg/m
 };
 
 /// @param velocity (body, point) -> Vec2
@@ -65,6 +66,7 @@ PointMotion point_motion_of(const std::vector<Body>& bodies, Velocity&& velocity
         const auto squared = [&](std::size_t p) { return v[p][0] * v[p][0] + v[p][1] * v[p][1]; };
         const auto s = ordered_sum<3>(q.count, [&](std::size_t p) { return std::array{squared(p), v[p][0], v[p][1]}; });
         motion.kinetic_energy += 0.5 * q.mass * s[0];
+        motion.mass += q.mass * static_cast<double>(q.count);
         motion.momentum[0] += q.mass * s[1];
         motion.momentum[1] += q.mass * s[2];
         square = std::max(square, parallel_max(q.count, squared));

@@ -360,13 +360,12 @@ TEST(Guards, UnresolvedEnergy)
         const Points& q = solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
             all += 0.5 * q.mass * wave(0, p)[0] * wave(0, p)[0];
-        return unresolved_energy(solver->bodies(), lattice, 0.25, wave).velocity / all;
+        return unresolved_energy(solver->bodies(), lattice, 0.25, wave) / all;
     };
     for (const double n : {4.0, 8.0, 16.0})
         EXPECT_NEAR(share(n) / std::pow((1 - std::cos(2 * std::numbers::pi / n)) / 3, 2), 1, 0.25) << n;
     EXPECT_GT(share(2), 0.4);
-    EXPECT_EQ(unresolved_energy(solver->bodies(), lattice, 0.25, [](std::size_t, std::size_t) { return Vec2{1, 2}; }).stress, 0);
-    EXPECT_LT(unresolved_energy(solver->bodies(), lattice, 0.25, [](std::size_t, std::size_t) { return Vec2{1, 2}; }).velocity, 1e-20);
+    EXPECT_LT(unresolved_energy(solver->bodies(), lattice, 0.25, [](std::size_t, std::size_t) { return Vec2{1, 2}; }), 1e-20);
 }
 
 TEST(Guards, MomentumHourglassGravityDrift)
@@ -382,6 +381,7 @@ TEST(Guards, MomentumHourglassGravityDrift)
             GuardSample s;
             s.t = k;
             s.energy_scale = s.points.smallest = s.points.largest = 1;
+            s.point_motion.mass = s.points.mass = 1000;
             s.point_motion.kinetic_energy = 0.5;  // of 1000 kg/m: mass times speed is 31.6 kg/s
             change(s, k);
             guards.watch(s, *solver);
@@ -398,6 +398,10 @@ TEST(Guards, MomentumHourglassGravityDrift)
     EXPECT_EQ(codes("", [](GuardSample& s, int) { s.energy.hourglass = 0.11; }), "hourglass");
     EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1 + 0.009 * k, s.gravity_work = 1; }), "");
     EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1 + 0.011 * k, s.gravity_work = 1; }), "gravity_work");
+    // what a coarse record of a ramp cannot tell is no difference
+    EXPECT_EQ(
+        codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1 + 0.02 * k, s.gravity_work = 1, s.gravity_work_error = 0.011; }),
+        "");
     const auto swing = [](double drift)  // of a mass of 1000 kg/m that falls by 0.1 m in the mean
     { return [drift](GuardSample& s, int k) { s.points.moment[1] = -1000 * (0.1 * (1 - std::cos(0.5 * k)) + 0.1 * drift * k / 2000); }; };
     EXPECT_EQ(codes(floor_y + gravity, swing(0.008), 2000), "");
