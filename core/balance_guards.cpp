@@ -186,7 +186,7 @@ std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene)
         guards.push_back(std::make_unique<GravityGuard>(scene.may_flow()));
     if (find_variant(scene.method).family == "lpfdm" && scene.lpfdm.hourglass > 0)
         guards.push_back(std::make_unique<HourglassGuard>());
-    if (!is_loaded && !is_held && !scene.gravity)
+    if (!is_loaded && !is_held && !is_damped && !scene.gravity)
         guards.push_back(std::make_unique<MomentumGuard>());
     if (!is_loaded && is_held && !is_damped && !scene.may_flow() && scene.walls.empty() && scene.gravity &&
         std::hypot(scene.gravity->acceleration[0], scene.gravity->acceleration[1]) > 0)

@@ -394,6 +394,8 @@ TEST(Guards, MomentumHourglassGravityDrift)
     EXPECT_EQ(codes("", [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.015 * k; }), "");
     EXPECT_EQ(codes("", [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.017 * k; }), "momentum");
     EXPECT_EQ(codes(floor_y, [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.017 * k; }), "");
+    // local damping takes momentum, too
+    EXPECT_EQ(codes("[damping]\nlocal = 0.1\n", [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.017 * k; }), "");
     EXPECT_EQ(codes("", [](GuardSample& s, int) { s.energy.hourglass = 0.09; }), "");
     EXPECT_EQ(codes("", [](GuardSample& s, int) { s.energy.hourglass = 0.11; }), "hourglass");
     EXPECT_EQ(codes(gravity, [](GuardSample& s, int k) { s.energy.gravity = 1 + 0.009 * k, s.gravity_work = 1; }), "");
