@@ -41,14 +41,16 @@ inline constexpr CellBox no_cells{std::numeric_limits<int>::max(), std::numeric_
 struct Lattice
 {
     Vec2 origin;
-    double cell_size;  ///< L [m]
-    int nx, ny;        ///< cells
-    CellBox numbered;  ///< without the rings
+    double cell_size;         ///< L [m]
+    double cells_per_length;  ///< 1/L: a division for each bin would cost a fiftieth of a step [1/m]
+    int nx, ny;               ///< cells
+    CellBox numbered;         ///< without the rings
 
     /// All of it is numbered.
     Lattice(const Vec2& corner, double L, int columns, int rows)
         : origin(corner),
           cell_size(L),
+          cells_per_length(1 / L),
           nx(columns),
           ny(rows),
           numbered{0, 0, columns, rows}

@@ -60,16 +60,23 @@ private:
     Mask mask_;
 };
 
-/// Sets packs to zero one by one: a value-initialised array of them, or a loop over it, becomes a string instruction, which costs more
-/// than the sums.
+/// f(k) for k = 0..N-1, each a constant: an array of packs whose places are constants from the start lives in registers; of one that a
+/// loop runs over the compiler keeps a copy in memory, which costs more than the sums.
+template <std::size_t N, class F>
+TESTBED_INLINE inline void unrolled(F&& f)
+{
+    [&]<std::size_t... k>(std::index_sequence<k...>) TESTBED_INLINE
+    {
+        (f(std::integral_constant<std::size_t, k>{}), ...);
+    }
+    (std::make_index_sequence<N>{});
+}
+
+/// Sets packs to zero one by one: a value-initialised array of them becomes a string instruction.
 template <std::size_t N>
 TESTBED_INLINE inline void set_zero(std::array<Pack, N>& packs)
 {
-    [&]<std::size_t... k>(std::index_sequence<k...>)
-    {
-        ((packs[k] = Pack(0.0)), ...);
-    }
-    (std::make_index_sequence<N>{});
+    unrolled<N>([&](auto k) TESTBED_INLINE { packs[k] = Pack(0.0); });
 }
 
 /// Calls kernel(offset, lanes) for the points [begin, end).

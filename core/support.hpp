@@ -61,19 +61,27 @@ struct Weights
 {
     std::array<Pack, Support::S> x, y;
 
-    TESTBED_INLINE explicit Weights(const Corner& c)
+    TESTBED_INLINE explicit Weights(const Corner& c) : Weights(c, inverses(c)) {}
+
+private:
+    TESTBED_INLINE Weights(const Corner& c, const std::array<Pack, 2>& inverse)
+        : x(along(c.ax, c.wx, inverse[0])),
+          y(along(c.ay, c.wy, inverse[1]))
+    {
+    }
+    TESTBED_INLINE static std::array<Pack, 2> inverses(const Corner& c)
     {
         if constexpr (Support::has_box)
-        {
-            const auto inverse = inverse_widths(c);
-            x = Support::weights_by(c.ax, c.wx, inverse[0]);
-            y = Support::weights_by(c.ay, c.wy, inverse[1]);
-        }
+            return inverse_widths(c);
         else
-        {
-            x = Support::weights(c.ax, c.wx);
-            y = Support::weights(c.ay, c.wy);
-        }
+            return {c.wx, c.wy};  // not used
+    }
+    TESTBED_INLINE static std::array<Pack, Support::S> along(Pack a, Pack width, Pack inverse)
+    {
+        if constexpr (Support::has_box)
+            return Support::weights_by(a, width, inverse);
+        else
+            return Support::weights(a, width);
     }
 };
 
@@ -83,19 +91,19 @@ struct Box
     Pack x, y, hx, hy;
 };
 
-/// Maps points to the coordinates of their bin.
+/// Maps points to the coordinates of their bin, from its corner or from another place in it.
 struct BinFrame
 {
     const Lattice& lattice;
     const Bin& bin;
-    double scale, x0, y0;  ///< 1/L; bin corner in cells from the coordinate origin
+    double scale, x0, y0;  ///< 1/L; bin corner, or that place, in cells from the coordinate origin
 
-    BinFrame(const Lattice& in, const Bin& of)
+    BinFrame(const Lattice& in, const Bin& of, const Vec2& from = {0, 0})
         : lattice(in),
           bin(of),
-          scale(1 / lattice.cell_size),
-          x0(lattice.origin[0] * scale + bin.i),
-          y0(lattice.origin[1] * scale + bin.j)
+          scale(lattice.cells_per_length),
+          x0(lattice.origin[0] * scale + bin.i + from[0]),
+          y0(lattice.origin[1] * scale + bin.j + from[1])
     {
     }
 

@@ -107,29 +107,20 @@ inline Vec2 velocity_at_face(const LpfdmGrid& grid, const FreeFaces& faces, std:
 inline void convect(LpfdmGrid& grid, FreeFaces& faces, double dt, double share, const std::vector<double>* mass_before)
 {
     const Pack courant(share * dt / grid.lattice.cell_size), one(1.0), part(share);
-    faces.keep_gradients(grid,
-                         [&](std::size_t first_cell, std::size_t n, const auto& lanes)
-                         {
-                             const Pack cx = min(one, max(-one, lanes.load(&grid.nodes.vx[n]) * courant));
-                             const Pack cy = min(one, max(-one, lanes.load(&grid.nodes.vy[n]) * courant));
-                             return part * CentralConvection::gradient(grid, first_cell, lanes, cx, cy);
-                         });
-    std::vector<Vec2> at_faces(faces.list().size());
-    parallel_for(
-        at_faces.size(), [&](std::size_t f) { at_faces[f] = velocity_at_face(grid, faces, faces.list()[f], dt, share, mass_before); }, 64);
-    grid.nodes.for_each(
-        [&](std::size_t n, const auto& lanes)
+    faces.keep(
+        grid,
+        [&](std::size_t first_cell, const auto& lanes, const Velocity& v)
         {
-            const Velocity v =
-                CentralConvection::correct({lanes.load(&grid.nodes.vx[n]), lanes.load(&grid.nodes.vy[n])}, faces.gradient(n, lanes));
-            lanes.store(&grid.nodes.vx[n], v[0]);
-            lanes.store(&grid.nodes.vy[n], v[1]);
-        });
-    for (std::size_t f = 0; f < at_faces.size(); ++f)
-    {
-        grid.nodes.vx[faces.list()[f]] = at_faces[f][0];
-        grid.nodes.vy[faces.list()[f]] = at_faces[f][1];
-    }
+            const Pack cx = min(one, max(-one, v[0] * courant)), cy = min(one, max(-one, v[1] * courant));
+            return part * CentralConvection::gradient(grid, first_cell, lanes, cx, cy);
+        },
+        [](const Velocity& v, const Gradient<Pack>& g) { return CentralConvection::correct(v, g); });
+    const auto& at_faces = faces.list();
+    parallel_for(
+        at_faces.size(),
+        [&](std::size_t f) { faces.set_velocity(at_faces[f], velocity_at_face(grid, faces, at_faces[f], dt, share, mass_before)); }, 64);
+    // these continue what the others have become
+    faces.give_velocity(grid.nodes);
     for (const auto n : faces.ahead())
     {
         const auto v = faces.around(grid, nullptr, n, 1 / (share * dt)).linear();

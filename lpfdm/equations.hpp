@@ -29,31 +29,27 @@ public:
             v = min(v, Pack(body.counted_volume));
         const Pack pressure(body.confinement);
         const Pack xx = v * (lanes.load(&q.sxx[p]) + pressure), yy = v * (lanes.load(&q.syy[p]) + pressure), xy = v * lanes.load(&q.sxy[p]);
-        for (int j = 0; j < S; ++j)
-            for (int i = 0; i < S; ++i)
-            {
-                Pack* to = &total_[static_cast<std::size_t>(j * S + i) * quantities];
-                if constexpr (S == 1)
+        if constexpr (S == 1)
+        {
+            total_[1] += xx;
+            total_[2] += yy;
+            total_[3] += xy;
+        }
+        else
+            unrolled<S * S>(
+                [&](auto k) TESTBED_INLINE
                 {
-                    to[1] += xx;
-                    to[2] += yy;
-                    to[3] += xy;
-                }
-                else
-                {
-                    const Pack w = weights.x[i] * weights.y[j];
-                    to[0] += lanes.keep(w);
-                    to[1] += w * xx;
-                    to[2] += w * yy;
-                    to[3] += w * xy;
-                }
-            }
+                    const Pack w = weights.x[k % S] * weights.y[k / S];
+                    total_[k * quantities] += lanes.keep(w);
+                    total_[k * quantities + 1] += w * xx;
+                    total_[k * quantities + 2] += w * yy;
+                    total_[k * quantities + 3] += w * xy;
+                });
     }
     TESTBED_INLINE void write(const Body& body, const Bin& bin, double* to)
     {
         if constexpr (S > 1)
-            for (std::size_t k = 0; k < S * S; ++k)
-                total_[k * quantities] *= Pack(body.points.mass);
+            unrolled<S * S>([&](auto k) TESTBED_INLINE { total_[k * quantities] *= Pack(body.points.mass); });
         sum(total_, to);
         if constexpr (S == 1)
             to[0] = body.points.mass * static_cast<double>(bin.end - bin.begin);
@@ -144,23 +140,52 @@ inline double resist_hourglass(LpfdmGrid& grid, double rate, std::vector<double>
     return power;
 }
 
-/// Where the middle node of a bin meets its points when a share theta of the step has passed: K on the way x + alpha y of points, which the
-/// displacement to first order about the node takes to A (x + alpha y - K), and likewise across. There the nodal velocity, whose gradient
-/// jumps at lattice lines, moves and strains them: at the start of the step the jumps would act half a step late, and an
-/// oscillation move points against their boxes, first order in dt.
+/// The displacement about the middle node of a bin when a share theta of the step has passed, to first order: it takes a point at x to
+/// A (x - c + alpha (y - d)) from the node, and likewise across; (c, d) is where the point is that then reaches the node. There the nodal
+/// velocity, whose gradient jumps at lattice lines, moves and strains the points: at the start of the step the jumps would act half a step
+/// late, and an oscillation move points against their boxes, first order in dt.
 struct MidStep
 {
-    Vec2 stretch{1, 1}, slope{0, 0}, middle{1, 1};  ///< A, alpha, K in x and y
+    Vec2 stretch{1, 1}, slope{0, 0}, from{0, 0};  ///< A, alpha in x and y; (c, d) from the node [cells]
+};
 
-    MidStep() = default;
-    /// @param g gradient of the step's displacement @param u displacement of the middle node [cells]
-    TESTBED_INLINE MidStep(double theta, const Gradient<>& g, const Vec2& u) : stretch{1 + theta * g.xx, 1 + theta * g.yy}
+/// Of all nodes, as all bins need it: found bin by bin, each bin's points would wait for it.
+class MidSteps
+{
+public:
+    void resize(std::size_t nodes)
     {
-        const auto inverse = [](double e) { return 1 - e * (1 - e); };  // a division for each bin would cost a twentieth of a step
-        const double x = theta * inverse(theta * g.xx), y = theta * inverse(theta * g.yy);
-        slope = {x * g.xy, y * g.yx};
-        middle = {1 + slope[0] - x * u[0], 1 + slope[1] - y * u[1]};
+        for (auto* values : {&stretch_x_, &stretch_y_, &slope_x_, &slope_y_, &from_x_, &from_y_})
+            values->resize(nodes);
     }
+    /// From the gradients of the step's displacement, which the cells hold, and the velocity of the nodes.
+    void find(const LpfdmGrid& grid, double theta, double dt)
+    {
+        const Pack one(1.0), scale(theta * dt / grid.lattice.cell_size);
+        const auto inverse = [&](Pack e) { return one - e * (one - e); };  // good to the second order, as the rest is
+        grid.for_each_node(
+            [&](std::size_t n, std::size_t first_cell, const auto& lanes)
+            {
+                Gradient<Pack> sum = grid.cells.gradient(first_cell, lanes);
+                for (int k = 1; k < 4; ++k)
+                    sum = sum + grid.cells.gradient(grid.around(first_cell, k), lanes);
+                const Gradient<Pack> g = Pack(0.25 * theta) * sum;
+                const Pack x = inverse(g.xx), y = inverse(g.yy), slope_x = x * g.xy, slope_y = y * g.yx;
+                const Pack ux = x * scale * lanes.load(&grid.nodes.vx[n]), uy = y * scale * lanes.load(&grid.nodes.vy[n]);
+                const Pack turn = inverse(-slope_x * slope_y);
+                lanes.store(&stretch_x_[n], one + g.xx);
+                lanes.store(&stretch_y_[n], one + g.yy);
+                lanes.store(&slope_x_[n], slope_x);
+                lanes.store(&slope_y_[n], slope_y);
+                lanes.store(&from_x_[n], turn * (slope_x * uy - ux));
+                lanes.store(&from_y_[n], turn * (slope_y * ux - uy));
+            });
+    }
+    MidStep at(std::size_t n) const { return {{stretch_x_[n], stretch_y_[n]}, {slope_x_[n], slope_y_[n]}, {from_x_[n], from_y_[n]}}; }
+    std::size_t bytes() const { return 6 * stretch_x_.capacity() * sizeof(double); }
+
+private:
+    std::vector<double> stretch_x_, stretch_y_, slope_x_, slope_y_, from_x_, from_y_;
 };
 
 /// What is constant in a bin: the gradient of the increment averaged over a box, and the velocity of its (S+1) x (S+1) nodes, where it
@@ -174,7 +199,8 @@ struct BinMotion
     std::size_t stride;
     MidStep mid;  ///< for points with a box; others are moved from where they are
 
-    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin, double theta, double dt)
+    /// @param mid_steps not read for points without a box
+    TESTBED_INLINE BinMotion(const LpfdmGrid& grid, const Bin& bin, const MidSteps& mid_steps)
         : vx(&grid.nodes.vx[grid.lattice.node(bin.i, bin.j)]),
           vy(&grid.nodes.vy[grid.lattice.node(bin.i, bin.j)]),
           stride(grid.lattice.node_stride())
@@ -186,12 +212,18 @@ struct BinMotion
             coefficients[1] = cell(1, 0) - cell(0, 0);
             coefficients[2] = cell(0, 1) - cell(0, 0);
             coefficients[3] = cell(1, 1) - cell(1, 0) - coefficients[2];
-            const double scale = dt / grid.lattice.cell_size;
-            mid = MidStep(theta, coefficients[0] + 0.5 * (coefficients[1] + coefficients[2]) + 0.25 * coefficients[3],
-                          {scale * vx[stride + 1], scale * vy[stride + 1]});
+            mid = mid_steps.at(grid.lattice.node(bin.i + 1, bin.j + 1));
         }
     }
-    /// Displacement gradient and displacement of the points with these boxes over the step.
+    /// From where the operator takes boxes: from the bin's corner, in which a point is without a box, or its middle node.
+    TESTBED_INLINE Vec2 origin() const
+    {
+        if constexpr (S == 1)
+            return {0, 0};
+        else
+            return {1 + mid.from[0], 1 + mid.from[1]};
+    }
+    /// Displacement gradient of the points with these boxes over the step; their displacement is added to x and y.
     TESTBED_INLINE Gradient<Pack> operator()(const Box& box, double dt, Pack& x, Pack& y) const
     {
         Gradient<Pack> d = Pack(1.0) * coefficients[0];
@@ -199,8 +231,7 @@ struct BinMotion
             displace({Pack(1.0) - box.x, box.x}, {Pack(1.0) - box.y, box.y}, dt, x, y);
         else
         {
-            const Pack beyond_x = box.x + Pack(mid.slope[0]) * box.y - Pack(mid.middle[0]);
-            const Pack beyond_y = box.y + Pack(mid.slope[1]) * box.x - Pack(mid.middle[1]);
+            const Pack beyond_x = box.x + Pack(mid.slope[0]) * box.y, beyond_y = box.y + Pack(mid.slope[1]) * box.x;
             const Pack inverse = Pack(0.5) / (box.hx * box.hy);
             const Pack a = share(beyond_x, box.hx, inverse * box.hy), b = share(beyond_y, box.hy, inverse * box.hx);
             d = d + a * coefficients[1] + b * coefficients[2] + (a * b) * coefficients[3];
@@ -218,13 +249,12 @@ private:
     /// Bilinear weights of three nodes, this far beyond the middle one [cells].
     TESTBED_INLINE static std::array<Pack, 3> hat(Pack beyond)
     {
-        const Pack low = max(-beyond, Pack(0.0)), high = max(beyond, Pack(0.0));
+        const Pack high = max(beyond, Pack(0.0)), low = high - beyond;
         return {low, Pack(1.0) - low - high, high};
     }
-    TESTBED_INLINE void displace(const std::array<Pack, S + 1>& wx, std::array<Pack, S + 1> wy, double dt, Pack& x, Pack& y) const
+    TESTBED_INLINE void displace(const std::array<Pack, S + 1>& wx, const std::array<Pack, S + 1>& wy, double dt, Pack& x, Pack& y) const
     {
-        for (Pack& w : wy)
-            w *= Pack(dt);
+        Pack ux(0.0), uy(0.0);
         for (int j = 0; j <= S; ++j)
         {
             Pack rx(0.0), ry(0.0);
@@ -233,9 +263,11 @@ private:
                 rx += wx[i] * Pack(vx[j * stride + i]);
                 ry += wx[i] * Pack(vy[j * stride + i]);
             }
-            x += wy[j] * rx;
-            y += wy[j] * ry;
+            ux += wy[j] * rx;
+            uy += wy[j] * ry;
         }
+        x += Pack(dt) * ux;
+        y += Pack(dt) * uy;
     }
 };
 
@@ -243,7 +275,8 @@ private:
 /// sums of its bins (`sums`, from the body's first on) for the next step. Returns whether a point left its bin: its sums are then no longer
 /// right.
 template <class Support, class Law>
-bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, const StrainIncrement& increment, double dt, double* sums)
+bool move_points(const LpfdmGrid& grid, const MidSteps& mid_steps, Body& body, const Law& law, const StrainIncrement& increment, double dt,
+                 double* sums)
 {
     Points& q = body.points;
     Bins& sorted = body.bins;
@@ -252,8 +285,8 @@ bool move_points(const LpfdmGrid& grid, Body& body, const Law& law, const Strain
     parallel_for(bins.size(),
                  [&](std::size_t b) TESTBED_FLATTEN
                  {
-                     const BinFrame frame(grid.lattice, bins[b]);
-                     const BinMotion<Support> motion(grid, bins[b], increment.theta, dt);
+                     const BinMotion<Support> motion(grid, bins[b], mid_steps);
+                     const BinFrame frame(grid.lattice, bins[b], motion.origin());
                      for_each_pack(bins[b].begin, bins[b].end,
                                    [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                                    {

@@ -27,7 +27,7 @@ public:
     explicit FreeFaces(std::size_t nodes) { resize(nodes); }
     void resize(std::size_t nodes)
     {
-        for (auto* values : {&one_sided_, &xx_, &yy_, &xy_, &yx_})
+        for (auto* values : {&one_sided_, &xx_, &yy_, &xy_, &yx_, &new_x_, &new_y_})
             values->assign(nodes, 0.0);
     }
 
@@ -61,27 +61,40 @@ public:
                 });
     }
 
-    /// Keeps the gradient at each node. @param gradient (first cell, node, lanes) -> gradient of the increment at nodes
-    template <class NodeGradient>
-    void keep_gradients(const LpfdmGrid& grid, NodeGradient&& gradient)
+    /// Keeps the gradient at each node, and the velocity that convection makes of the node's own with it.
+    /// @param gradient (first cell, node, lanes, velocity) -> gradient of the increment at nodes @param correct (velocity, gradient) ->
+    /// velocity
+    template <class NodeGradient, class Correct>
+    void keep(const LpfdmGrid& grid, NodeGradient&& gradient, Correct&& correct)
     {
         grid.for_each_node(
             [&](std::size_t n, std::size_t first_cell, const auto& lanes)
             {
-                const Gradient<Pack> g = gradient(first_cell, n, lanes);
+                const std::array<Pack, 2> v{lanes.load(&grid.nodes.vx[n]), lanes.load(&grid.nodes.vy[n])};
+                const Gradient<Pack> g = gradient(first_cell, lanes, v);
+                const std::array<Pack, 2> corrected = correct(v, g);
                 lanes.store(&xx_[n], g.xx);
                 lanes.store(&yy_[n], g.yy);
                 lanes.store(&xy_[n], g.xy);
                 lanes.store(&yx_[n], g.yx);
+                lanes.store(&new_x_[n], corrected[0]);
+                lanes.store(&new_y_[n], corrected[1]);
             });
     }
-
-    /// The gradient at nodes [n, n + lanes).
-    template <class Lanes>
-    Gradient<Pack> gradient(std::size_t n, const Lanes& lanes) const
+    /// Gives a node of list() or ahead() another one.
+    void set_velocity(std::uint32_t node, const Vec2& v)
     {
-        return {lanes.load(&xx_[n]), lanes.load(&yy_[n]), lanes.load(&xy_[n]), lanes.load(&yx_[n])};
+        new_x_[node] = v[0];
+        new_y_[node] = v[1];
     }
+    /// The nodes take the velocity that was kept for them.
+    void give_velocity(Nodes& nodes)
+    {
+        nodes.vx.swap(new_x_);
+        nodes.vy.swap(new_y_);
+    }
+    /// Of a node that goes out of use.
+    void forget(std::uint32_t node) { set_velocity(node, {0, 0}); }
     const std::vector<std::uint32_t>& list() const { return faces_; }
     /// Nodes without mass that boxes may reach within the step: their velocity is that of the body, continued.
     const std::vector<std::uint32_t>& ahead() const { return ahead_; }
@@ -169,7 +182,7 @@ public:
         const double larger = std::max(a, b);
         return larger > 0 ? std::max(0.0, 1 - 2 * std::min(a, b) / larger) : 0;
     }
-    std::size_t bytes() const { return 5 * xx_.capacity() * sizeof(double) + (faces_.capacity() + ahead_.capacity()) * sizeof(faces_[0]); }
+    std::size_t bytes() const { return 7 * xx_.capacity() * sizeof(double) + (faces_.capacity() + ahead_.capacity()) * sizeof(faces_[0]); }
 
 private:
     struct Layer
@@ -195,6 +208,7 @@ private:
 
     std::vector<double> one_sided_;          ///< 1 at nodes of faces_ and ahead_
     std::vector<double> xx_, yy_, xy_, yx_;  ///< gradient of the increment at nodes
+    std::vector<double> new_x_, new_y_;      ///< velocity of nodes after a share of the convection
     std::vector<std::uint32_t> faces_, ahead_;
 };
 }  // namespace testbed

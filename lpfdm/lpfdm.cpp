@@ -124,6 +124,8 @@ public:
                {
                    cell_gradients(grid_, dt);
                    gradients_over_ = dt;
+                   if constexpr (Support::has_box)
+                       mid_steps_.find(grid_, increment_.theta, dt);
                });
         timer_("points (6), material",
                [&]
@@ -131,9 +133,10 @@ public:
                    std::size_t first_bin = 0;
                    for (Body& body : bodies_)
                    {
-                       moved_ |= std::visit([&](const auto& law)
-                                            { return move_points<Support>(grid_, body, law, increment_, dt, sums_.of(first_bin)); },
-                                            body.material);
+                       moved_ |=
+                           std::visit([&](const auto& law)
+                                      { return move_points<Support>(grid_, mid_steps_, body, law, increment_, dt, sums_.of(first_bin)); },
+                                      body.material);
                        first_bin += body.bins.list().size();
                    }
                });
@@ -180,7 +183,8 @@ public:
         return bytes_of(bodies_) + grid_.bytes() + mass_before_.capacity() * sizeof(double) + sums_.bytes() +
                (workspace_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity()) * sizeof(double) +
                cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) +
-               (faces_ ? faces_->bytes() : 0) + (weight_ ? weight_->bytes() : 0) + cell_weight_.capacity() * sizeof(double);
+               (faces_ ? faces_->bytes() : 0) + mid_steps_.bytes() + (weight_ ? weight_->bytes() : 0) +
+               cell_weight_.capacity() * sizeof(double);
     }
     void write_state(StateWriter& writer) override { state(writer); }
     void read_state(StateReader& reader) override { state(reader); }
@@ -300,6 +304,8 @@ private:
         grid_.renumber(to);
         if (faces_)
             faces_->resize(to.nodes());
+        if constexpr (Support::has_box)
+            mid_steps_.resize(to.nodes());
         if (body_force_)
             cell_force_.assign(to.cells(), {0, 0});
         if (weight_)
@@ -331,7 +337,11 @@ private:
                 nodes_.vy[n] = v[1];
             }
         for (const auto n : left_)
+        {
             nodes_.mass[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
+            if (faces_)
+                faces_->forget(n);
+        }
         const auto update = [&](std::uint32_t n)
         {
             if (!(nodes_.mass[n] > 0))
@@ -461,6 +471,7 @@ private:
     std::vector<std::uint32_t> left_;  ///< nodes that went out of use
     LpfdmSpec options_;
     StrainIncrement increment_;
+    MidSteps mid_steps_;                             ///< empty for points without a box
     LpfdmSums<Support> sums_;                        ///< up to date from the end of a step on, but for bins that points left
     std::vector<double> workspace_;                  ///< the way of a field to its new order
     std::vector<double> hourglass_x_, hourglass_y_;  ///< empty unless the scene has them

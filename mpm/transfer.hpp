@@ -145,7 +145,7 @@ public:
     static constexpr int S = Shape::S;
     static constexpr std::size_t Q = sums_of<what>, numbers = static_cast<std::size_t>(S * S) * Q;
 
-    TESTBED_INLINE NodeSums(const Lattice& lattice, const Bin&) : scale_(1 / lattice.cell_size) { set_zero(total_); }
+    TESTBED_INLINE NodeSums(const Lattice& lattice, const Bin&) : scale_(lattice.cells_per_length) { set_zero(total_); }
 
     /// Points [p, p + lanes) of the body, with their support at c.
     template <class Lanes>

@@ -20,7 +20,7 @@ public:
     static constexpr std::size_t Q = 2, numbers = static_cast<std::size_t>(S * S) * Q;
 
     TESTBED_INLINE SmoothedSums(const Lattice& lattice, const Bin& bin, const std::vector<double>& x, const std::vector<double>& y)
-        : scale_(1 / lattice.cell_size),
+        : scale_(lattice.cells_per_length),
           field_(lattice, bin, x, y)
     {
         set_zero(total_);

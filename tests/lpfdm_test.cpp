@@ -71,6 +71,9 @@ void check_virtual_work()
             mass += grid.nodes.mass[n];
         }
         cell_gradients(grid, dt);
+        MidSteps at_start;
+        at_start.resize(grid.lattice.nodes());
+        at_start.find(grid, 0, dt);
         double work = 0, total = 0, scale = 0;
         for (Body& body : state.bodies)
         {
@@ -78,8 +81,8 @@ void check_virtual_work()
             total += q.mass * static_cast<double>(q.count);
             for (const Bin& bin : body.bins.list())
             {
-                const BinFrame frame(grid.lattice, bin);
-                const BinMotion<Support> motion(grid, bin, 0, 0);
+                const BinMotion<Support> motion(grid, bin, at_start);
+                const BinFrame frame(grid.lattice, bin, motion.origin());
                 for (std::size_t p = bin.begin; p < bin.end; ++p)
                 {
                     Pack x(0.0), y(0.0);

@@ -84,8 +84,11 @@ struct Patch
     {
         cell_gradients(grid, dt);
         faces.find(grid);
-        faces.keep_gradients(grid, [&](std::size_t c, std::size_t, const auto& lanes)
-                             { return CentralConvection::gradient(grid, c, lanes, Pack(0.0), Pack(0.0)); });
+        faces.keep(
+            grid,
+            [&](std::size_t c, const auto& lanes, const Velocity&)
+            { return CentralConvection::gradient(grid, c, lanes, Pack(0.0), Pack(0.0)); },
+            [](const Velocity& v, const Gradient<Pack>&) { return v; });
     }
 };
 
@@ -256,9 +259,13 @@ Vec2 moved(double theta, const Vec2& at, double dt)
             bin = &b;
     if (!bin)
         throw std::logic_error("no such bin");
-    const BinMotion<DomainSupport> motion(p.grid, *bin, theta, dt);
+    MidSteps mid_steps;
+    mid_steps.resize(p.grid.lattice.nodes());
+    mid_steps.find(p.grid, theta, dt);
+    const BinMotion<DomainSupport> motion(p.grid, *bin, mid_steps);
     Pack x(at[0]), y(at[1]);
-    motion(Box{Pack(at[0] - bin->i), Pack(at[1] - bin->j), Pack(0.25), Pack(0.25)}, dt, x, y);
+    const Vec2 from = motion.origin();
+    motion(Box{Pack(at[0] - bin->i - from[0]), Pack(at[1] - bin->j - from[1]), Pack(0.25), Pack(0.25)}, dt, x, y);
     return {x[0], y[0]};
 }
 /// x + (e^(G t) - 1) G^-1 v(x), by its series.
