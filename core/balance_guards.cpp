@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
+#include <map>
 
 namespace testbed
 {
@@ -113,34 +115,95 @@ class DriftGuard final : public Guard
 {
 public:
     explicit DriftGuard(const GravitySpec& gravity) : gravity_(gravity) {}
-    void watch(const GuardSample& s, const Solver&) override
+    void watch(const GuardSample& s, const Solver& solver) override
     {
         const double g = std::hypot(gravity_.acceleration[0], gravity_.acceleration[1]);
-        const double fall =
-            (s.points.moment[0] * gravity_.acceleration[0] + s.points.moment[1] * gravity_.acceleration[1]) / (g * s.points.mass);
-        at_start_ = at_start_.value_or(fall);
-        if (s.t < gravity_.ramp)
+        const Vec2 down{gravity_.acceleration[0] / g, gravity_.acceleration[1] / g};
+        body_.add(s.t, (down[0] * s.points.moment[0] + down[1] * s.points.moment[1]) / s.points.mass, s.t >= gravity_.ramp);
+        if (!s.is_fresh)
             return;
-        t_.push_back(s.t);
-        fall_.push_back(fall - *at_start_);
+        double top = std::numeric_limits<double>::infinity();
+        for (const Body& body : solver.bodies())
+            for (std::size_t p = 0; p < body.points.count; ++p)
+                top = std::min(top, down[0] * body.points.x[p] + down[1] * body.points.y[p]);
+        top_.add(s.t, top, s.t >= gravity_.ramp);
     }
     std::optional<Finding> finding(bool) const override
     {
-        const std::size_t tenth = t_.size() / 10;
-        const auto mean = [&](std::size_t from)
-        { return mean_of_periods(std::span(t_).subspan(from, tenth), std::span(fall_).subspan(from, tenth)); };
-        const auto first = mean(0), last = mean(t_.size() - tenth);
-        if (!first || !last || !(std::abs(*last - *first) > limits::drift * std::abs(*first)))
-            return std::nullopt;
-        return Finding{"drift",
-                       fmt::format("the mean settlement of an undamped oscillation went from {:.4g} to {:.4g} m, though nothing moves it",
-                                   *first, *last)};
+        for (const auto& [record, what] : {std::pair{&body_, ""}, std::pair{&top_, " of the top"}})
+            if (const auto means = record->first_and_last();
+                means && std::abs(means->second - means->first) > limits::drift * std::abs(means->first))
+                return Finding{"drift", fmt::format("the mean settlement{} of an undamped oscillation went from {:.4g} to {:.4g} m, though "
+                                                    "nothing moves it",
+                                                    what, means->first, means->second)};
+        return std::nullopt;
     }
 
 private:
+    /// How far something has fallen.
+    class Fall
+    {
+    public:
+        void add(double t, double depth, bool counts)
+        {
+            at_start_ = at_start_.value_or(depth);
+            if (!counts)
+                return;
+            t_.push_back(t);
+            fall_.push_back(depth - *at_start_);
+        }
+        /// Means of the first and the last tenth.
+        std::optional<std::pair<double, double>> first_and_last() const
+        {
+            const std::size_t tenth = t_.size() / 10;
+            const auto mean = [&](std::size_t from)
+            { return mean_of_periods(std::span(t_).subspan(from, tenth), std::span(fall_).subspan(from, tenth)); };
+            const auto first = mean(0), last = mean(t_.size() - tenth);
+            return first && last ? std::optional(std::pair{*first, *last}) : std::nullopt;
+        }
+
+    private:
+        std::optional<double> at_start_{};
+        std::vector<double> t_{}, fall_{};
+    };
+
     GravitySpec gravity_;
-    std::optional<double> at_start_{};
-    std::vector<double> t_{}, fall_{};
+    Fall body_{}, top_{};  ///< of the centre of mass, and of the highest point
+};
+
+/// An elastic body that nothing but walls moves. However suddenly they start, a wave carries at most twice their speed: more motion is
+/// stress let go, where the body parted or its points crossed cells.
+class ReleaseGuard final : public Guard
+{
+public:
+    void watch(const GuardSample& s, const Solver& solver) override
+    {
+        for (const RestraintRecord& r : solver.restraints())
+        {
+            const auto seen = at_.find(r.name);
+            if (seen != at_.end() && r.displacement && s.t > t_)
+                speed_ = std::max(speed_,
+                                  std::hypot((*r.displacement)[0] - seen->second[0], (*r.displacement)[1] - seen->second[1]) / (s.t - t_));
+            at_[r.name] = r.displacement.value_or(Vec2{0, 0});
+        }
+        t_ = s.t;
+        if (s.is_fresh && s.point_motion.kinetic_energy > limits::is_static * s.energy.elastic)
+            kinetic_ = std::max(kinetic_, s.point_motion.kinetic_energy), mass_ = s.point_motion.mass;
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        const double driven = 0.5 * mass_ * speed_ * speed_;
+        if (speed_ > 0 && kinetic_ > limits::released * driven)
+            return Finding{"released",
+                           fmt::format("the walls move at {:.3g} m/s at most, the elastic body at {:.3g} m/s in the mean: stress was "
+                                       "let go, as where a body parts or its points cross cells",
+                                       speed_, std::sqrt(2 * kinetic_ / mass_))};
+        return std::nullopt;
+    }
+
+private:
+    std::map<std::string, Vec2> at_{};  ///< displacement of the walls
+    double t_ = 0, speed_ = 0, kinetic_ = 0, mass_ = 0;
 };
 }  // namespace
 
@@ -191,6 +254,9 @@ std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene)
     if (!is_loaded && is_held && !is_damped && !scene.may_flow() && scene.walls.empty() && scene.gravity &&
         std::hypot(scene.gravity->acceleration[0], scene.gravity->acceleration[1]) > 0)
         guards.push_back(std::make_unique<DriftGuard>(*scene.gravity));
+    if (!is_loaded && !scene.gravity && !scene.may_flow() && !scene.walls.empty() &&
+        std::none_of(scene.bodies.begin(), scene.bodies.end(), [](const BodySpec& body) { return body.velocity.has_value(); }))
+        guards.push_back(std::make_unique<ReleaseGuard>());
     return guards;
 }
 }  // namespace testbed

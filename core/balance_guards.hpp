@@ -10,6 +10,6 @@ namespace testbed
 /// in all
 std::optional<double> mean_of_periods(std::span<const double> t, std::span<const double> y);
 
-/// energy, gravity_work, hourglass, momentum, drift: as far as the scene has what they balance.
+/// energy, gravity_work, hourglass, momentum, drift, released: as far as the scene has what they balance.
 std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene);
 }  // namespace testbed

@@ -183,7 +183,7 @@ Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& fac
     const bool noise = found(facts, "noise");
     if (m.is_mpm && !m.b_bar && nearly_incompressible && (noise || (m.linear && oscillation > oscillates)))
         return {"locking", m.linear ? "mpm.strain=b_bar" : ""};
-    if (found(facts, "crossing"))
+    if (found(facts, "crossing") || found(facts, "released"))
         return {"crossing", wider_support(m)};
     if (found(facts, "mixed_cells"))
         return {"mixed_cells", ""};

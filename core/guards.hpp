@@ -26,7 +26,7 @@ struct GuardSample
     bool is_fresh = true;  ///< else point_motion is that of an earlier sample, and nothing else that costs a pass is asked for
 };
 
-/// Why a run is suspect. Codes: energy, gravity_work, hourglass, momentum, drift, noise, crossing, mixed_cells, volume,
+/// Why a run is suspect. Codes: energy, gravity_work, hourglass, momentum, drift, released, noise, crossing, mixed_cells, volume,
 /// outside, courant, not_at_rest, separated, contact_lost, small_strain, time_step.
 struct Finding
 {
@@ -53,6 +53,7 @@ inline constexpr double gravity_work_flow = 0.05;  ///< so, where the law may fl
 inline constexpr double hourglass = 0.1;           ///< of the energy of the run
 inline constexpr double momentum = 5e-4;           ///< change over mass times speed, where no force acts
 inline constexpr double drift = 0.01;              ///< of the mean settlement of an oscillation
+inline constexpr double released = 10;             ///< kinetic energy over that of a body as fast as the walls
 inline constexpr double stress_error = 0.25;       ///< of the stresses at rest, from their average over cells, in the L2 norm
 inline constexpr double noise_share = 0.3;         ///< of the energy at the end
 inline constexpr double worth_noise = 0.01;        ///< noise of less than this share of the largest energy is not
