@@ -172,7 +172,7 @@ private:
 };
 
 /// An elastic body that nothing but walls moves. However suddenly they start, a wave carries at most twice their speed: more motion is
-/// stress let go, where the body parted or its points crossed cells.
+/// stress let go, where the body parted or its points crossed cells. Walls that turn back may swing it up: then nothing is said.
 class ReleaseGuard final : public Guard
 {
 public:
@@ -181,10 +181,17 @@ public:
         for (const RestraintRecord& r : solver.restraints())
         {
             const auto seen = at_.find(r.name);
-            if (seen != at_.end() && r.displacement && s.t > t_)
-                speed_ = std::max(speed_,
-                                  std::hypot((*r.displacement)[0] - seen->second[0], (*r.displacement)[1] - seen->second[1]) / (s.t - t_));
-            at_[r.name] = r.displacement.value_or(Vec2{0, 0});
+            if (!r.displacement)
+                continue;
+            Vec2 way{0, 0};
+            if (seen != at_.end() && s.t > t_)
+            {
+                const auto& [place, last] = seen->second;
+                way = {(*r.displacement)[0] - place[0], (*r.displacement)[1] - place[1]};
+                turned_ = turned_ || way[0] * last[0] + way[1] * last[1] < 0;
+                speed_ = std::max(speed_, std::hypot(way[0], way[1]) / (s.t - t_));
+            }
+            at_[r.name] = {*r.displacement, way};
         }
         t_ = s.t;
         if (s.is_fresh && s.point_motion.kinetic_energy > limits::is_static * s.energy.elastic)
@@ -193,7 +200,7 @@ public:
     std::optional<Finding> finding(bool) const override
     {
         const double driven = 0.5 * mass_ * speed_ * speed_;
-        if (speed_ > 0 && kinetic_ > limits::released * driven)
+        if (!turned_ && speed_ > 0 && kinetic_ > limits::released * driven)
             return Finding{"released",
                            fmt::format("the walls move at {:.3g} m/s at most, the elastic body at {:.3g} m/s in the mean: stress was "
                                        "let go, as where a body parts or its points cross cells",
@@ -202,7 +209,8 @@ public:
     }
 
 private:
-    std::map<std::string, Vec2> at_{};  ///< displacement of the walls
+    std::map<std::string, std::pair<Vec2, Vec2>> at_{};  ///< displacement of the walls, and the last part of it
+    bool turned_ = false;
     double t_ = 0, speed_ = 0, kinetic_ = 0, mass_ = 0;
 };
 }  // namespace

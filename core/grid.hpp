@@ -42,7 +42,7 @@ struct Lattice
 {
     Vec2 origin;
     double cell_size;         ///< L [m]
-    double cells_per_length;  ///< 1/L: a division for each bin would cost a fiftieth of a step [1/m]
+    double cells_per_length;  ///< 1/L, without a division for each bin [1/m]
     int nx, ny;               ///< cells
     CellBox numbered;         ///< without the rings
 

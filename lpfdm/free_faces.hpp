@@ -81,7 +81,7 @@ public:
                 lanes.store(&new_y_[n], corrected[1]);
             });
     }
-    /// Gives a node of list() or ahead() another one.
+    /// Gives a node another one.
     void set_velocity(std::uint32_t node, const Vec2& v)
     {
         new_x_[node] = v[0];
