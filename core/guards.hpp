@@ -59,6 +59,7 @@ inline constexpr double noise_share = 0.3;         ///< of the energy at the end
 inline constexpr double worth_noise = 0.01;        ///< noise of less than this share of the largest energy is not
 inline constexpr double is_static = 0.01;          ///< kinetic over strain energy: what moves less is at rest for a look at its stresses
 inline constexpr double crossed = 0.01;            ///< volume at rest in other cells than at the start
+inline constexpr double squeezed = 0.01;           ///< change of volume of points at rest, in the mean weighted by energy
 inline constexpr double mixed = 0.01;              ///< volume in cells of two stiffnesses
 inline constexpr double contrast = 4;              ///< of stiffnesses
 inline constexpr double smallest_volume = 0.2;     ///< current over initial

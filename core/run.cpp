@@ -290,6 +290,8 @@ void write_performance(ResultFile& file, Solver& solver, const StepControl& cloc
     file.attribute(group, "dt_shortest", clock.shortest());
     file.attribute(group, "dt_longest", clock.longest());
     file.attribute(group, "dt_critical", clock.critical());
+    if (clock.sharp())
+        file.attribute(group, "dt_sharp", *clock.sharp());
     for (const auto& [phase, seconds] : solver.timer().phases())
         file.attribute(group + "/phases", phase, seconds);
 }

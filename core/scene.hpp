@@ -35,7 +35,7 @@ struct TimeSpec
     double end = 0, cfl = 0.5;
     std::optional<double> dt, stop_unbalanced, wall_clock_limit;
     bool follows_limit = false;  ///< dt = "auto"
-    bool density_scaling = false;
+    bool density_scaling = false, sharp_limit = false;
 
     template <class V>
     void describe(V& v)
@@ -46,6 +46,8 @@ struct TimeSpec
         v.optional(
             "density_scaling", density_scaling, "-",
             "for damped scenes on their way to rest: masses of stiffer bodies are raised, not their weight, so that all have one limit");
+        v.optional("sharp_limit", sharp_limit, "-",
+                   "the result file says the limit of the points as they stand at the start, too, an eigenvalue of the whole body");
         v.optional(
             "stop_unbalanced", stop_unbalanced, "-",
             "the run completes earlier, when unbalanced over internal nodal forces and kinetic over strain energy are both below this");

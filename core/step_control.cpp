@@ -12,6 +12,8 @@ StepControl::StepControl(const Scene& scene, Solver& solver)
       cfl_(scene.time.cfl),
       critical_(solver.critical_time_step(scene))
 {
+    if (scene.time.sharp_limit)
+        sharp_ = solver.sharp_step_limit();
     dt_ = solver.is_static() ? end_ : scene.time.dt ? *scene.time.dt : cfl_ * critical_;
     if (!(end_ / dt_ < 1e12))
         throw SceneError(fmt::format("{}: time.end = {:.4g} s takes more than 1e12 steps of {:.4g} s", scene.path, end_, dt_));

@@ -17,6 +17,8 @@ public:
     double shortest() const { return shortest_; }
     double longest() const { return longest_; }
     double critical() const { return critical_; }  ///< the limit at the start [s]
+    /// So, of the points as they stand, if the scene asks for it and the method knows it [s].
+    const std::optional<double>& sharp() const { return sharp_; }
     bool is_at_end() const { return follows_limit_ ? t_ >= end_ : taken_ >= total_; }
 
     /// After a step. @throws Diverged when the limit has fallen to a millionth of the first
@@ -27,6 +29,7 @@ private:
 
     Solver& solver_;
     bool follows_limit_;
+    std::optional<double> sharp_{};
     double end_, cfl_, critical_ = 0, t_ = 0, dt_ = 0, shortest_ = 0, longest_ = 0;
     std::int64_t taken_ = 0, total_ = 0;
 };

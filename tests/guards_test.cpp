@@ -476,6 +476,22 @@ TEST(Guards, CrossingUnderLoad)
     EXPECT_EQ(watch(block(floor_y + sides + weight, 0, 2), "mpm-cpgimp", {}, 50).codes(), "");
 }
 
+/// A column with one point to a cell that settles by a thirtieth: none crosses, yet LPFDM takes each cell to be partly empty.
+TEST(Guards, SqueezedCellsThatNothingCrossesInto)
+{
+    const auto settled = [](const std::string& method, const std::string& g)
+    {
+        const std::string weight = "[gravity]\nacceleration = [0.0, -" + g + "]\n[damping]\nlocal = 0.5\n";
+        return watch(block(floor_y + sides + weight, 0, 2), method, {"body.block.points_per_cell=1"}, 50);
+    };
+    const Watched w = settled("lpfdm-2000", "5.0");
+    EXPECT_TRUE(w.found("crossing")) << w.codes();
+    EXPECT_EQ(w.diagnosis.cause, "crossing");
+    EXPECT_EQ(settled("lpfdm-2000", "1.0").codes(), "");
+    EXPECT_EQ(settled("lpfdm", "5.0").codes(), "");
+    EXPECT_EQ(settled("mpm-linear", "5.0").codes(), "");
+}
+
 /// A stiff body that sinks into the cells of a soft one.
 TEST(Guards, MixedCells)
 {

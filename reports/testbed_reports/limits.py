@@ -10,7 +10,8 @@ STEP_KEYS = ("time.cfl", "time.dt")  # settings of the time step: compared as dt
 @dataclass
 class Limit:
     """One search: the runs at both ends of the last bracket, None while it is not closed. `measured`: (low, high) of the searched
-    value; for a time step `stated` is the solver's own limit over c_p/L like `step`, the bracket of dt c_p / L."""
+    value; for a time step `stated` is the solver's own limit over c_p/L like `step`, the bracket of dt c_p / L, and `sharp` that of the
+    points as they stand, where the runs know it."""
     case: str
     key: str
     axes: dict
@@ -20,12 +21,18 @@ class Limit:
     measured: tuple = (math.nan, math.nan)
     step: tuple = (math.nan, math.nan)
     stated: float = math.nan
+    sharp: float = math.nan
     verdict: str = ""
 
     @property
     def ratio(self):
         """Measured over stated, the middle of the bracket."""
         return sum(self.step) / 2 / self.stated
+
+    @property
+    def sharp_ratio(self):
+        """Measured over sharp, the middle of the bracket."""
+        return sum(self.step) / 2 / self.sharp
 
 
 def _courant(run, name):
@@ -36,6 +43,11 @@ def _courant(run, name):
         return dt * math.sqrt(soil["constrained_modulus"] / soil["density"]) / run.result.cell_size
     except (AttributeError, KeyError, StopIteration, TypeError, ValueError):
         return math.nan
+
+
+def _known_courant(runs, name):
+    """Of the first run that knows it."""
+    return next((dt for dt in (_courant(run, name) for run in runs) if math.isfinite(dt)), math.nan)
 
 
 def _close(limit, search):
@@ -55,8 +67,7 @@ def _close(limit, search):
     limit.above = max(high, key=lambda r: r.verdict.rank)
     if search.key in STEP_KEYS:
         limit.step = (_courant(limit.below, "dt"), _courant(limit.above, "dt"))
-        stated = _courant(limit.below, "dt_critical")
-        limit.stated = stated if math.isfinite(stated) else _courant(limit.above, "dt_critical")
+        limit.stated, limit.sharp = (_known_courant((limit.below, limit.above), name) for name in ("dt_critical", "dt_sharp"))
 
 
 def find_limits(study):
@@ -76,6 +87,7 @@ def find_limits(study):
             continue
         limit.below.values["bracket"], limit.above.values["bracket"] = "below", "above"
         limit.below.rows["limit", "measured"] = limit.measured[0]
-        if math.isfinite(limit.ratio):
-            limit.below.rows["limit", "ratio"] = limit.ratio
+        for name in ("ratio", "sharp_ratio"):
+            if math.isfinite(getattr(limit, name)):
+                limit.below.rows["limit", name] = getattr(limit, name)
     return list(found.values())

@@ -171,13 +171,17 @@ def limit_table(study, matrix):
             if limit is None or limit.below is None:
                 row.append(limit.verdict if limit else "")
             elif math.isfinite(limit.ratio):
-                row.append(f"{number(sum(limit.step) / 2, 4)} | {number(limit.stated, 4)}")
+                known = (sum(limit.step) / 2, limit.sharp, limit.stated)
+                row.append(" | ".join(number(dt, 4) for dt in known if math.isfinite(dt)))
             else:
                 row.append(f"{number(limit.measured[0], 4)}–{number(limit.measured[1], 4)}")
         rows.append(row)
     step = any(math.isfinite(limit.ratio) for limit in limits)
     key = limits[0].key
-    what = "time step over L/c_p: measured (middle of the last bracket) | stated by the solver" if step else f"{key}: last bracket"
+    what = f"{key}: last bracket"
+    if step:
+        predicted = " | predicted for these points" if any(math.isfinite(limit.sharp) for limit in limits) else ""
+        what = f"time step over L/c_p: measured (middle of the last bracket){predicted} | stated by the solver"
     return Table(f"limits_{matrix.case.name}", f"Limits, {matrix.case.title}: {what}",
                  ["method", *(f"{matrix.parameter} = {value_text(v)}" for v in matrix.values)], rows)
 

@@ -265,6 +265,16 @@ def test_check_says_what_the_scene_uses():
     assert "velocity_x" in run("check", COLUMN, "--method", "mpm-linear").stdout
 
 
+@pytest.mark.parametrize("asked", [True, False])
+def test_the_sharp_limit_is_what_check_says_where_the_scene_asks_for_it(tmp_path, asked):
+    settings = ("--method", "mpm-cpgimp", "--set", f"time.sharp_limit={str(asked).lower()}")
+    assert run("run", COLUMN, *settings, "-o", tmp_path / "r.h5", "--set", "time.end=0.01").returncode == 0
+    said = float(run("check", COLUMN, *settings).stdout.split("sharp limit")[1].split()[0])
+    with h5py.File(tmp_path / "r.h5") as file:
+        known = file["performance"].attrs.get("dt_sharp")
+    assert known == pytest.approx(said, rel=1e-4) if asked else known is None
+
+
 def test_doc_list_and_usage():
     assert "cell_size" in run("doc", "grid").stdout
     assert run("doc", "gird").returncode == 1

@@ -4,6 +4,7 @@ import json
 import math
 import re
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from test_study import Bench
 from testbed_reports.bisection import Bisection, bracket, next_values, problem_of
 from testbed_reports.dataset import read_study_folder
 from testbed_reports.failures import cheapest, costs
+from testbed_reports.limits import find_limits
 from testbed_reports.matrix import build as build_matrices
 from testbed_reports.metrics import grade
 from testbed_reports.report import build
@@ -112,6 +114,28 @@ def test_a_search_treats_a_run_without_a_file_as_failed(tmp_path):
     limits = {limit.runs[0].name: limit for limit in read_study_folder(bench.out).limits}
     assert limits["mpm-linear"].below is None and "not sound at either end" in limits["mpm-linear"].verdict
     assert limits["lpfdm"].below is not None
+
+
+def test_a_limit_of_the_time_step_stands_beside_the_stated_and_the_sharp_one():
+    """dt c_p / L of the last bracket, with c_p = 20 m/s and L = 0.5 m, over what the runs know of both; without either, no number."""
+    def run(cfl, level, **known):
+        result = SimpleNamespace(performance={"dt": 0.01 * cfl, **known}, cell_size=0.5,
+                                 materials={"soil": {"constrained_modulus": 4e5, "density": 1e3}})
+        return SimpleNamespace(result=result, values={"time.cfl": cfl, "case": "c", "nu": 0.3}, search="s", rows={},
+                               verdict=SimpleNamespace(level=level, rank=0))
+
+    def limits(**known):
+        search = Bisection("time.cfl", 1.0, 2.0, "sound", 0.1)
+        study = SimpleNamespace(spec=SimpleNamespace(combinations=[SimpleNamespace(case="c", bisection=search)]),
+                                runs=[run(1.0, "sound", **known), run(1.5, "sound", **known), run(1.6, "failed", **known), run(2.0, "failed", **known)],
+                                case=lambda name: SimpleNamespace(axis_keys=["nu", "time.cfl"]))
+        (limit,) = find_limits(study)
+        return limit
+
+    limit = limits(dt_critical=0.01, dt_sharp=0.0125)
+    assert limit.step == pytest.approx((0.6, 0.64)) and (limit.stated, limit.sharp) == pytest.approx((0.4, 0.5))
+    assert limit.below.rows == pytest.approx({("limit", "measured"): 1.5, ("limit", "ratio"): 1.55, ("limit", "sharp_ratio"): 1.24})
+    assert set(limits(dt_critical=0.01).below.rows) == {("limit", "measured"), ("limit", "ratio")}
 
 
 CASES = """\
