@@ -489,7 +489,7 @@ TEST(Guards, SqueezedCellsThatNothingCrossesInto)
     EXPECT_EQ(w.diagnosis.cause, "crossing");
     EXPECT_EQ(settled("lpfdm-2000", "1.0").codes(), "");
     EXPECT_EQ(settled("lpfdm", "5.0").codes(), "");
-    EXPECT_EQ(settled("mpm-linear", "5.0").codes(), "");
+    EXPECT_FALSE(settled("mpm-linear", "5.0").found("crossing"));
 }
 
 /// A stiff body that sinks into the cells of a soft one.
