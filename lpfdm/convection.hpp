@@ -89,15 +89,15 @@ inline Vec2 velocity_at_face(const LpfdmGrid& grid, const FreeFaces& faces, std:
                              const std::vector<double>* mass_before)
 {
     Vec2 v{grid.nodes.vx[n], grid.nodes.vy[n]};
-    const double won = mass_before ? std::max(0.0, 1 - (*mass_before)[n] / grid.nodes.mass[n]) : 0;
-    const double sliver = std::max(0.0, 1 - grid.nodes.mass[n] / (FreeFaces::sliver * faces.full_mass));
-    if (won > 0 || sliver > 0)
+    const double won = mass_before ? 1 - (*mass_before)[n] / grid.nodes.mass[n] : 0;
+    const double sliver = 1 - grid.nodes.mass[n] / (FreeFaces::sliver * faces.full_mass);
+    const double part = std::max({0.0, won, sliver});
+    if (part > 0)
     {
-        const Vec2 arriving = faces.arriving(grid, mass_before, n, 1 / (share * dt), v, std::max(won, sliver));
-        const double part = std::max(won, sliver);
+        const Vec2 arriving = faces.arriving(grid, mass_before, n, 1 / (share * dt), v, part);
         v = {v[0] + part * (arriving[0] - v[0]), v[1] + part * (arriving[1] - v[1])};
     }
-    const Gradient<> g = faces.across(grid, n, share);
+    const Gradient<> g = faces.across(grid, n, share, 1 - part);
     const double inverse = 1 / ((1 + g.xx) * (1 + g.yy) - g.xy * g.yx);
     return {((1 + g.yy) * v[0] - g.xy * v[1]) * inverse, ((1 + g.xx) * v[1] - g.yx * v[0]) * inverse};
 }

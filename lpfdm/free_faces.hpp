@@ -4,8 +4,9 @@
 /// The central difference of the convection needs material on both sides. Where it is missing, the gradient of the cell that is left holds
 /// the node's own velocity with the sign that feeds it (a downwind difference, at a face that recedes), and mass that arrives at a node
 /// with next to none would take the velocity that this node happens to have. Therefore
-/// - the derivative across a face comes from the next layer of cells, which does not hold the node's own velocity: neither fed nor damped,
-///   exact for linear fields, and the same whether the face comes or goes, so that an oscillation rectifies nothing;
+/// - the derivative across a face comes from the next layer of cells, which does not hold the node's own velocity: exact for linear fields,
+///   and the same whether the face comes or goes, so that an oscillation rectifies nothing. A face that leads would let short waves grow
+///   with each cell that it travels: there the node's own gradient damps them;
 /// - mass that arrives brings the velocity of the place that it comes from: m v <- m_before v + (m - m_before) v_a, with v_a extrapolated
 ///   from the neighbours, exact for linear fields.
 
@@ -99,9 +100,10 @@ public:
     /// Nodes without mass that boxes may reach within the step: their velocity is that of the body, continued.
     const std::vector<std::uint32_t>& ahead() const { return ahead_; }
 
-    /// Gradient at a node of list(): across a face that of the next layer of cells, or none where there is no such layer.
+    /// Gradient at a node of list(): across a face see derivative_at_face(), with none for the next layer of cells where there is none.
     /// @param share of the step, to which the kept gradients belong
-    Gradient<> across(const LpfdmGrid& grid, std::uint32_t node, double share) const
+    /// @param its share of the node's velocity that did not arrive just now, and counts in its own gradient
+    Gradient<> across(const LpfdmGrid& grid, std::uint32_t node, double share, double its) const
     {
         const int i = grid.lattice.node_i(node), j = grid.lattice.node_j(node);
         const Gradient<> own{xx_[node], yy_[node], xy_[node], yx_[node]};
@@ -113,17 +115,22 @@ public:
             const bool to_right = right.mass > left.mass;
             const int next = to_right ? i + 1 : i - 2;
             const Layer inner = layer(grid, {next, j}, {next, j - 1});
-            const double weight = share * outer * std::min(1.0, inner.mass / std::max(left.mass, right.mass));
-            g.xx = (1 - outer) * own.xx + weight * inner.mean.xx;
-            g.yx = (1 - outer) * own.yx + weight * inner.mean.yx;
+            const double weight = std::min(1.0, inner.mass / std::max(left.mass, right.mass));
+            const Vec2 d = derivative_at_face({own.xx, own.yx}, {share * weight * inner.mean.xx, share * weight * inner.mean.yx},
+                                              (to_right ? grid.nodes.vx[node] < 0 : grid.nodes.vx[node] > 0) ? its : 0.0);
+            g.xx = (1 - outer) * own.xx + outer * d[0];
+            g.yx = (1 - outer) * own.yx + outer * d[1];
         }
         if (const double outer = imbalance(down.mass, up.mass); outer > 0)
         {
-            const int next = up.mass > down.mass ? j + 1 : j - 2;
+            const bool to_top = up.mass > down.mass;
+            const int next = to_top ? j + 1 : j - 2;
             const Layer inner = layer(grid, {i, next}, {i - 1, next});
-            const double weight = share * outer * std::min(1.0, inner.mass / std::max(down.mass, up.mass));
-            g.yy = (1 - outer) * own.yy + weight * inner.mean.yy;
-            g.xy = (1 - outer) * own.xy + weight * inner.mean.xy;
+            const double weight = std::min(1.0, inner.mass / std::max(down.mass, up.mass));
+            const Vec2 d = derivative_at_face({own.xy, own.yy}, {share * weight * inner.mean.xy, share * weight * inner.mean.yy},
+                                              (to_top ? grid.nodes.vy[node] < 0 : grid.nodes.vy[node] > 0) ? its : 0.0);
+            g.xy = (1 - outer) * own.xy + outer * d[0];
+            g.yy = (1 - outer) * own.yy + outer * d[1];
         }
         return g;
     }
@@ -185,6 +192,18 @@ public:
     std::size_t bytes() const { return 7 * xx_.capacity() * sizeof(double) + (faces_.capacity() + ahead_.capacity()) * sizeof(faces_[0]); }
 
 private:
+    /// That of the next layer. At a face that leads this feeds short waves: there the node's own, which is then the upwind one, as far as
+    /// it takes from a difference between the node and its neighbour. In smooth motion the own one falls to zero towards a free face: then
+    /// there is nothing to take, and whether the face comes or goes makes no difference.
+    static Vec2 derivative_at_face(const Vec2& own, const Vec2& next, double leads)
+    {
+        const Vec2 apart{own[0] - next[0], own[1] - next[1]};
+        const double square = apart[0] * apart[0] + apart[1] * apart[1];
+        if (!(square > 0))
+            return next;
+        const double part = leads * std::clamp(2 * (own[0] * apart[0] + own[1] * apart[1]) / square, 0.0, 1.0);
+        return {next[0] + part * apart[0], next[1] + part * apart[1]};
+    }
     struct Layer
     {
         double mass = 0;

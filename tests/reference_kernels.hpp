@@ -207,6 +207,7 @@ struct RefLpfdm
             Gradient<> g = h * rate.at(k);
             if (faces.count(k))
             {
+                const Vec2 moves = w;
                 const double before = old_mass.count(k) ? old_mass.at(k) : 0;
                 const double share = std::max({0.0, mass_arrives ? 1 - before / mass : 0.0, 1 - mass / sliver_mass});
                 if (share > 0)
@@ -234,21 +235,35 @@ struct RefLpfdm
                              right = mass_of(cells, i, j - 1) + mass_of(cells, i, j);
                 const double down = mass_of(cells, i - 1, j - 1) + mass_of(cells, i, j - 1),
                              up = mass_of(cells, i - 1, j) + mass_of(cells, i, j);
+                // where the face leads, the part of its own derivative that damps
+                const auto across = [&](const Vec2& own, const Vec2& next, bool leads)
+                {
+                    const Vec2 apart{own[0] - next[0], own[1] - next[1]};
+                    const double square = apart[0] * apart[0] + apart[1] * apart[1];
+                    if (!leads || square == 0)
+                        return next;
+                    const double along = 2 * (own[0] * apart[0] + own[1] * apart[1]) / square;
+                    const double own_part = (1 - std::max(0.0, share)) * std::min(1.0, std::max(0.0, along));
+                    return Vec2{next[0] + own_part * apart[0], next[1] + own_part * apart[1]};
+                };
+                const Gradient<> own = g;
                 if (const double part = missing(left, right); part > 0)
                 {
                     const int next = right > left ? i + 1 : i - 2;
                     const auto [M, inner] = pair({next, j - 1}, {next, j});
-                    const double take = part * std::min(1.0, M / std::max(left, right));
-                    g.xx = (1 - part) * g.xx + take * h * inner.xx;
-                    g.yx = (1 - part) * g.yx + take * h * inner.yx;
+                    const double take = h * std::min(1.0, M / std::max(left, right));
+                    const Vec2 d = across({own.xx, own.yx}, {take * inner.xx, take * inner.yx}, (left - right) * moves[0] > 0);
+                    g.xx = (1 - part) * own.xx + part * d[0];
+                    g.yx = (1 - part) * own.yx + part * d[1];
                 }
                 if (const double part = missing(down, up); part > 0)
                 {
                     const int next = up > down ? j + 1 : j - 2;
                     const auto [M, inner] = pair({i - 1, next}, {i, next});
-                    const double take = part * std::min(1.0, M / std::max(down, up));
-                    g.xy = (1 - part) * g.xy + take * h * inner.xy;
-                    g.yy = (1 - part) * g.yy + take * h * inner.yy;
+                    const double take = h * std::min(1.0, M / std::max(down, up));
+                    const Vec2 d = across({own.xy, own.yy}, {take * inner.xy, take * inner.yy}, (down - up) * moves[1] > 0);
+                    g.xy = (1 - part) * own.xy + part * d[0];
+                    g.yy = (1 - part) * own.yy + part * d[1];
                 }
             }
             v[k] = ref_departed(w, g);

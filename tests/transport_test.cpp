@@ -142,29 +142,69 @@ TEST(FreeFaces, LinearFieldArrivesExactly)
         }
 }
 
-/// The derivative across a face is that of the next layer and does not know the velocity of the node at the face; at a corner in both
-/// directions.
+/// The derivative across a face that recedes is that of the next layer and does not know the velocity of the node at the face; at a corner
+/// in both directions.
 TEST(FreeFaces, GradientAcrossIsOfTheNextLayer)
 {
     Patch p{Ring{1}};
-    p.set([](const Vec2& x) { return Vec2{std::sin(x[0] + 2 * x[1]), std::cos(3 * x[0] - x[1])}; });
+    const auto field = [](const Vec2& x) { return Vec2{std::sin(x[0] + 2 * x[1]) - 9, std::cos(3 * x[0] - x[1]) - 9}; };
+    p.set(field);
     p.find(0.1);
-    const auto at = [&](int i, int j) { return p.faces.across(p.grid, p.node(i, j), 1); };
-    const Gradient<> face = at(2, 4), corner = at(7, 7);
+    const auto at = [&](int i, int j) { return p.faces.across(p.grid, p.node(i, j), 1, 1); };
+    const Gradient<> face = at(7, 4), corner = at(7, 7);
     EXPECT_EQ(corner.xx, p.grid.cells.xx[p.grid.lattice.cell(5, 6)]);
     EXPECT_EQ(corner.xy, p.grid.cells.xy[p.grid.lattice.cell(6, 5)]);
-    for (const auto n : {p.node(2, 4), p.node(7, 7)})
+    for (const auto n : {p.node(7, 4), p.node(7, 7)})
     {
         p.grid.nodes.vx[n] += 5;
         p.grid.nodes.vy[n] -= 3;
     }
     p.find(0.1);
-    EXPECT_EQ(at(2, 4).xx, face.xx);
-    EXPECT_EQ(at(2, 4).yx, face.yx);
+    EXPECT_EQ(at(7, 4).xx, face.xx);
+    EXPECT_EQ(at(7, 4).yx, face.yx);
     EXPECT_EQ(at(7, 7).xx, corner.xx);
     EXPECT_EQ(at(7, 7).yy, corner.yy);
     EXPECT_EQ(at(7, 7).xy, corner.xy);
     EXPECT_EQ(at(7, 7).yx, corner.yx);
+}
+
+/// At a face that leads it is the node's own where that takes from a difference between node and neighbour, on any side of a body; none
+/// of it where that would feed it, or where the node's velocity arrived just now; a part where both gradients are opposite.
+TEST(FreeFaces, LeadingFaceTakesFromShortWaves)
+{
+    struct Side
+    {
+        Vec2 out;
+        int i, j;
+    };
+    for (const Side& side : {Side{{1, 0}, 7, 4}, Side{{-1, 0}, 2, 4}, Side{{0, 1}, 4, 7}, Side{{0, -1}, 4, 2}})
+    {
+        // normal and tangential velocity with these differences from the node to the next one inside, and on to the one after
+        const auto derivative = [&](double at_face, double inside, double its, double speed)
+        {
+            Patch p{Ring{1}};
+            p.set(
+                [&](const Vec2& x)
+                {
+                    const double depth = std::abs(side.out[0] * (side.i - x[0]) + side.out[1] * (side.j - x[1]));
+                    const double v = depth < 0.5 ? at_face + inside : depth < 1.5 ? inside : 0;
+                    return Vec2{side.out[0] * speed - 2 * v, side.out[1] * speed - 2 * v};
+                });
+            p.find(0.1);
+            const Gradient<> g = p.faces.across(p.grid, p.node(side.i, side.j), 1, its);
+            const bool x = side.out[0] != 0;
+            EXPECT_NEAR(x ? g.xx : g.yy, x ? g.yx : g.xy, 1e-12);
+            return (x ? g.xx : g.yy) / (-0.2 * (side.out[0] + side.out[1]));
+        };
+        EXPECT_NEAR(derivative(3, 1, 1, 50), 3, 1e-9);       // steeper than inside: its own
+        EXPECT_NEAR(derivative(3, 1, 0.25, 50), 1.5, 1e-9);  // of a velocity that arrived to three quarters
+        EXPECT_NEAR(derivative(3, 1, 1, -50), 1, 1e-9);      // the face recedes
+        EXPECT_NEAR(derivative(1, 3, 1, 50), 3, 1e-9);       // less steep: would feed
+        EXPECT_NEAR(derivative(1, -1, 1, 50), 1, 1e-9);      // opposite: all of it
+        EXPECT_NEAR(derivative(1, -5, 1, 50), -3, 1e-9);     // a third of the way
+        EXPECT_NEAR(derivative(0, 1, 1, 50), 1, 1e-9);
+        EXPECT_NEAR(derivative(1, 0, 1, 50), 1, 1e-9);
+    }
 }
 
 /// Mass that arrives at a node with a velocity of its own is never further from the mean of the neighbours than the node; at one
