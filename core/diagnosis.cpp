@@ -184,8 +184,10 @@ Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& fac
     const bool noise = found(facts, "noise");
     if (m.is_mpm && !m.b_bar && nearly_incompressible && (noise || (m.linear && oscillation > oscillates)))
         return {"locking", m.linear ? "mpm.strain=b_bar" : ""};
-    if (found(facts, "crossing") || found(facts, "released"))
+    if (found(facts, "crossing"))
         return {"crossing", wider_support(m)};
+    if (found(facts, "released"))
+        return {m.point_support || m.linear ? "crossing" : "separation", wider_support(m)};
     if (found(facts, "mixed_cells"))
         return {"mixed_cells", ""};
     if (found(facts, "drift"))

@@ -133,7 +133,7 @@ public:
                                                        const Vec2 v = solver.velocity(b, k);
                                                        return Vec2{v[0] - frame[0], v[1] - frame[1]};
                                                    });
-            if (noise > limits::worth_noise * most_)
+            if (noise > limits::worth_noise * most_ && noise > limits::rounding * s.point_motion.kinetic_energy)
                 share_ = noise / std::max(energy(s), 1e-300);
         }
     }
@@ -173,7 +173,7 @@ CellKey cell_of(const Lattice& lattice, const Points& q, std::size_t p)
 
 /// Points that belong to one cell as a whole carry their stress along when they cross a lattice line, and the nodal force jumps. What came
 /// to rest in other cells than it started in is wrong from row to row. LPFDM, which shares the mass of a cell as a whole too, is wrong
-/// before: until the next point comes, a cell whose points were squeezed is taken to be partly empty.
+/// before: a cell keeps the mass of its points, and is taken to be partly empty when they are squeezed, overfull when they are stretched.
 class CrossingGuard final : public Guard
 {
 public:
@@ -201,15 +201,15 @@ public:
                        { crossed += cell_of(lattice_, q, p) != at_start_[q.id[p]] ? q.current_volume(p) : 0; });
         share_ = crossed / s.points.volume;
         if (shares_cells_)
-            stress_error_ = squeezed(solver.bodies());
+            squeezed_ = squeezed(solver.bodies());
     }
     std::optional<Finding> finding(bool) const override
     {
-        if (share_ <= limits::crossed && stress_error_ > limits::squeezed)
+        if (share_ <= limits::crossed && squeezed_ > limits::squeezed)
             return Finding{"crossing",
                            fmt::format("cells hold the points that they started with, though the volume of these changed by {:.2g} in the "
-                                       "mean, weighted by energy: the stress at rest is wrong by as much until others cross into them",
-                                       stress_error_)};
+                                       "mean, weighted by energy: the stress at rest is wrong by as much",
+                                       squeezed_)};
         if (share_ > limits::crossed)
             return Finding{"crossing",
                            fmt::format("points that hold {:.2g} of the volume came to rest in other cells than they started in; each "
@@ -235,10 +235,8 @@ private:
             for (std::size_t p = 0; p < body.points.count; ++p)
             {
                 const Points& q = body.points;
-                const double V = q.current_volume(p);
-                const double energy = V * elastic_energy_density(moduli(body.material), {q.sxx[p], q.syy[p], q.sxy[p]},
-                                                                 out_of_plane_stress(moduli(body.material), q, p));
-                sum += energy * std::abs(V / q.initial_volume - 1);
+                const double energy = strain_energy(q, moduli(body.material), p);
+                sum += energy * std::abs(q.current_volume(p) / q.initial_volume - 1);
                 weight += energy;
             }
         return weight > 0 ? sum / weight : 0;
@@ -247,7 +245,7 @@ private:
     Lattice lattice_;
     bool shares_cells_;
     std::vector<CellKey> at_start_;  ///< by id, which counts on from body to body
-    double share_ = 0, stress_error_ = 0;
+    double share_ = 0, squeezed_ = 0;
 };
 
 /// Cells that hold points of a stiff and of a soft body have one strain for both.

@@ -26,7 +26,7 @@ struct GuardSample
     bool is_fresh = true;  ///< else point_motion is that of an earlier sample, and nothing else that costs a pass is asked for
 };
 
-/// Why a run is suspect. Codes: energy, gravity_work, hourglass, momentum, drift, released, noise, crossing, mixed_cells, volume,
+/// Why a run is suspect. Codes: energy, loss, gravity_work, hourglass, momentum, drift, released, noise, crossing, mixed_cells, volume,
 /// outside, courant, not_at_rest, separated, contact_lost, small_strain, time_step.
 struct Finding
 {
@@ -48,6 +48,7 @@ public:
 namespace limits
 {
 inline constexpr double energy_gain = 0.02;        ///< of the energy of the run
+inline constexpr double energy_loss = 0.5;         ///< so, to the numbers, of an elastic body without damping
 inline constexpr double gravity_work = 0.01;       ///< at the nodes against that on the points
 inline constexpr double gravity_work_flow = 0.05;  ///< so, where the law may flow
 inline constexpr double hourglass = 0.1;           ///< of the energy of the run
@@ -56,6 +57,7 @@ inline constexpr double drift = 0.01;              ///< of the mean settlement o
 inline constexpr double released = 10;             ///< kinetic energy over that of a body as fast as the walls
 inline constexpr double stress_error = 0.25;       ///< of the stresses at rest, from their average over cells, in the L2 norm
 inline constexpr double noise_share = 0.3;         ///< of the energy at the end
+inline constexpr double rounding = 1e-18;          ///< of the kinetic energy: what moves less about the centre of mass is rounding
 inline constexpr double worth_noise = 0.01;        ///< noise of less than this share of the largest energy is not
 inline constexpr double is_static = 0.01;          ///< kinetic over strain energy: what moves less is at rest for a look at its stresses
 inline constexpr double crossed = 0.01;            ///< volume at rest in other cells than at the start

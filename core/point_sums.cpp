@@ -18,21 +18,18 @@ double work_over_energy(double volume_ratio)
     return 2 * (a - 1 + 1 / volume_ratio) / (a * a);
 }
 
-namespace
-{
-double energy_of(const Points& q, const ElasticModuli& base, std::size_t p)
+double strain_energy(const Points& q, const ElasticModuli& base, std::size_t p)
 {
     const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
     return q.current_volume(p) * elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}, out_of_plane_stress(base, q, p)) / softer;
 }
-}  // namespace
 
 double strain_energy(const std::vector<Body>& bodies)
 {
     double total = 0;
     for (const Body& body : bodies)
         total += ordered_sum<1>(body.points.count, [&, base = moduli(body.material)](std::size_t p)
-                                { return std::array{energy_of(body.points, base, p)}; })[0];
+                                { return std::array{strain_energy(body.points, base, p)}; })[0];
     return total;
 }
 
@@ -48,7 +45,7 @@ PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice)
         const auto s = ordered_sum<6>(q.count,
                                       [&](std::size_t p)
                                       {
-                                          const double volume = q.current_volume(p), energy = energy_of(q, base, p);
+                                          const double volume = q.current_volume(p), energy = strain_energy(q, base, p);
                                           const bool inside =
                                               q.x[p] >= low[0] && q.x[p] <= high[0] && q.y[p] >= low[1] && q.y[p] <= high[1];
                                           return std::array<double, 6>{energy,        energy * work_over_energy(volume * initial),

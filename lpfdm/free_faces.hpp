@@ -109,6 +109,7 @@ public:
         const Gradient<> own{xx_[node], yy_[node], xy_[node], yx_[node]};
         const Layer right = layer(grid, {i, j}, {i, j - 1}), left = layer(grid, {i - 1, j}, {i - 1, j - 1}),
                     up = layer(grid, {i, j}, {i - 1, j}), down = layer(grid, {i, j - 1}, {i - 1, j - 1});
+        const double shear = 0.5 * (own.xy + own.yx);
         Gradient<> g = own;
         if (const double outer = imbalance(left.mass, right.mass); outer > 0)
         {
@@ -116,8 +117,9 @@ public:
             const int next = to_right ? i + 1 : i - 2;
             const Layer inner = layer(grid, {next, j}, {next, j - 1});
             const double weight = std::min(1.0, inner.mass / std::max(left.mass, right.mass));
-            const Vec2 d = derivative_at_face({own.xx, own.yx}, {share * weight * inner.mean.xx, share * weight * inner.mean.yx},
-                                              (to_right ? grid.nodes.vx[node] < 0 : grid.nodes.vx[node] > 0) ? its : 0.0);
+            const Vec2 d =
+                derivative_at_face({own.xx, own.yx}, {own.xx, shear}, {share * weight * inner.mean.xx, share * weight * inner.mean.yx},
+                                   (to_right ? grid.nodes.vx[node] < 0 : grid.nodes.vx[node] > 0) ? its : 0.0);
             g.xx = (1 - outer) * own.xx + outer * d[0];
             g.yx = (1 - outer) * own.yx + outer * d[1];
         }
@@ -127,8 +129,9 @@ public:
             const int next = to_top ? j + 1 : j - 2;
             const Layer inner = layer(grid, {i, next}, {i - 1, next});
             const double weight = std::min(1.0, inner.mass / std::max(down.mass, up.mass));
-            const Vec2 d = derivative_at_face({own.xy, own.yy}, {share * weight * inner.mean.xy, share * weight * inner.mean.yy},
-                                              (to_top ? grid.nodes.vy[node] < 0 : grid.nodes.vy[node] > 0) ? its : 0.0);
+            const Vec2 d =
+                derivative_at_face({own.xy, own.yy}, {shear, own.yy}, {share * weight * inner.mean.xy, share * weight * inner.mean.yy},
+                                   (to_top ? grid.nodes.vy[node] < 0 : grid.nodes.vy[node] > 0) ? its : 0.0);
             g.xy = (1 - outer) * own.xy + outer * d[0];
             g.yy = (1 - outer) * own.yy + outer * d[1];
         }
@@ -193,15 +196,16 @@ public:
 
 private:
     /// That of the next layer. At a face that leads this feeds short waves: there the node's own, which is then the upwind one, as far as
-    /// it takes from a difference between the node and its neighbour. In smooth motion the own one falls to zero towards a free face: then
-    /// there is nothing to take, and whether the face comes or goes makes no difference.
-    static Vec2 derivative_at_face(const Vec2& own, const Vec2& next, double leads)
+    /// it takes from a strain across the face. In smooth motion that strain falls to what the free face leaves of it, and the two
+    /// derivatives to one: whether the face comes or goes then makes no difference.
+    /// @param strain of the node's own gradient, that part of it in which a rotation has no share
+    static Vec2 derivative_at_face(const Vec2& own, const Vec2& strain, const Vec2& next, double leads)
     {
         const Vec2 apart{own[0] - next[0], own[1] - next[1]};
         const double square = apart[0] * apart[0] + apart[1] * apart[1];
         if (!(square > 0))
             return next;
-        const double part = leads * std::clamp(2 * (own[0] * apart[0] + own[1] * apart[1]) / square, 0.0, 1.0);
+        const double part = leads * std::clamp(2 * (strain[0] * apart[0] + strain[1] * apart[1]) / square, 0.0, 1.0);
         return {next[0] + part * apart[0], next[1] + part * apart[1]};
     }
     struct Layer

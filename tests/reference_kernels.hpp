@@ -236,13 +236,13 @@ struct RefLpfdm
                 const double down = mass_of(cells, i - 1, j - 1) + mass_of(cells, i, j - 1),
                              up = mass_of(cells, i - 1, j) + mass_of(cells, i, j);
                 // where the face leads, the part of its own derivative that damps
-                const auto across = [&](const Vec2& own, const Vec2& next, bool leads)
+                const auto across = [&](const Vec2& own, const Vec2& strain, const Vec2& next, bool leads)
                 {
                     const Vec2 apart{own[0] - next[0], own[1] - next[1]};
                     const double square = apart[0] * apart[0] + apart[1] * apart[1];
                     if (!leads || square == 0)
                         return next;
-                    const double along = 2 * (own[0] * apart[0] + own[1] * apart[1]) / square;
+                    const double along = 2 * (strain[0] * apart[0] + strain[1] * apart[1]) / square;
                     const double own_part = (1 - std::max(0.0, share)) * std::min(1.0, std::max(0.0, along));
                     return Vec2{next[0] + own_part * apart[0], next[1] + own_part * apart[1]};
                 };
@@ -252,7 +252,8 @@ struct RefLpfdm
                     const int next = right > left ? i + 1 : i - 2;
                     const auto [M, inner] = pair({next, j - 1}, {next, j});
                     const double take = h * std::min(1.0, M / std::max(left, right));
-                    const Vec2 d = across({own.xx, own.yx}, {take * inner.xx, take * inner.yx}, (left - right) * moves[0] > 0);
+                    const Vec2 d = across({own.xx, own.yx}, {own.xx, (own.xy + own.yx) / 2}, {take * inner.xx, take * inner.yx},
+                                          (left - right) * moves[0] > 0);
                     g.xx = (1 - part) * own.xx + part * d[0];
                     g.yx = (1 - part) * own.yx + part * d[1];
                 }
@@ -261,7 +262,8 @@ struct RefLpfdm
                     const int next = up > down ? j + 1 : j - 2;
                     const auto [M, inner] = pair({i - 1, next}, {i, next});
                     const double take = h * std::min(1.0, M / std::max(down, up));
-                    const Vec2 d = across({own.xy, own.yy}, {take * inner.xy, take * inner.yy}, (down - up) * moves[1] > 0);
+                    const Vec2 d = across({own.xy, own.yy}, {(own.xy + own.yx) / 2, own.yy}, {take * inner.xy, take * inner.yy},
+                                          (down - up) * moves[1] > 0);
                     g.xy = (1 - part) * own.xy + part * d[0];
                     g.yy = (1 - part) * own.yy + part * d[1];
                 }

@@ -163,6 +163,7 @@ def limit_table(study, matrix):
     limits = [limit for limit in study.limits if limit.case == matrix.case.name]
     if not limits:
         return None
+    sharp = any(math.isfinite(limit.sharp) for limit in limits)
     rows = []
     for method in matrix.methods:
         row = [method]
@@ -171,8 +172,8 @@ def limit_table(study, matrix):
             if limit is None or limit.below is None:
                 row.append(limit.verdict if limit else "")
             elif math.isfinite(limit.ratio):
-                known = (sum(limit.step) / 2, limit.sharp, limit.stated)
-                row.append(" | ".join(number(dt, 4) for dt in known if math.isfinite(dt)))
+                known = (sum(limit.step) / 2, limit.sharp, limit.stated) if sharp else (sum(limit.step) / 2, limit.stated)
+                row.append(" | ".join(number(dt, 4) if math.isfinite(dt) else "–" for dt in known))
             else:
                 row.append(f"{number(limit.measured[0], 4)}–{number(limit.measured[1], 4)}")
         rows.append(row)
@@ -180,7 +181,7 @@ def limit_table(study, matrix):
     key = limits[0].key
     what = f"{key}: last bracket"
     if step:
-        predicted = " | predicted for these points" if any(math.isfinite(limit.sharp) for limit in limits) else ""
+        predicted = " | predicted for these points" if sharp else ""
         what = f"time step over L/c_p: measured (middle of the last bracket){predicted} | stated by the solver"
     return Table(f"limits_{matrix.case.name}", f"Limits, {matrix.case.title}: {what}",
                  ["method", *(f"{matrix.parameter} = {value_text(v)}" for v in matrix.values)], rows)
