@@ -417,6 +417,9 @@ TEST(Guards, MomentumHourglassGravityDrift)
             all += f.code;
         return all;
     };
+    EXPECT_EQ(codes("", [](GuardSample& s, int k) { s.energy.numerical = -0.45 * k; }), "");
+    EXPECT_EQ(codes("", [](GuardSample& s, int k) { s.energy.numerical = -0.55 * k; }), "loss");
+    EXPECT_EQ(codes("[damping]\nlocal = 0.1\n", [](GuardSample& s, int k) { s.energy.numerical = -0.55 * k; }), "");
     EXPECT_EQ(codes("", [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.015 * k; }), "");
     EXPECT_EQ(codes("", [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.017 * k; }), "momentum");
     EXPECT_EQ(codes(floor_y, [](GuardSample& s, int k) { s.motion.momentum[1] = 5 + 0.017 * k; }), "");
@@ -471,6 +474,19 @@ TEST(Guards, HourglassPatternIsNoise)
         EXPECT_TRUE(w.found("noise")) << frame << w.codes();
         EXPECT_EQ(w.diagnosis.cause, "null_mode") << frame;
     }
+}
+
+/// What moves about the centre of mass of a body in plain flight is rounding.
+TEST(Guards, FlightIsNoNoise)
+{
+    for (const std::string method : {"lpfdm-2000", "lpfdm", "mpm-linear", "mpm-cpgimp"})
+        for (const double end : {0.03, 0.1, 0.2})
+            for (const std::string speed : {"0.71", "1.7", "3.3"})
+            {
+                const std::string flight = "velocity = [\"" + speed + "\", \"0.53\"]";
+                EXPECT_EQ(watch(block("", 0.9, end, "law = \"hypoelastic_jaumann\"", flight), method).codes(), "")
+                    << method << " " << speed;
+            }
 }
 
 /// A column that settles by a tenth: whole rows cross lattice lines.
