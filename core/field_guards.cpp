@@ -205,16 +205,16 @@ public:
     }
     std::optional<Finding> finding(bool) const override
     {
-        if (share_ <= limits::crossed && squeezed_ > limits::squeezed)
-            return Finding{"crossing",
-                           fmt::format("cells hold the points that they started with, though the volume of these changed by {:.2g} in the "
-                                       "mean, weighted by energy: the stress at rest is wrong by as much",
-                                       squeezed_)};
         if (share_ > limits::crossed)
             return Finding{"crossing",
                            fmt::format("points that hold {:.2g} of the volume came to rest in other cells than they started in; each "
                                        "crossing of a lattice line made the force jump",
                                        share_)};
+        if (squeezed_ > limits::squeezed)
+            return Finding{"crossing",
+                           fmt::format("cells hold the points that they started with, though the volume of these changed by {:.2g} in the "
+                                       "mean, weighted by energy: the stress at rest is wrong by as much",
+                                       squeezed_)};
         return std::nullopt;
     }
 

@@ -117,9 +117,9 @@ public:
             const int next = to_right ? i + 1 : i - 2;
             const Layer inner = layer(grid, {next, j}, {next, j - 1});
             const double weight = std::min(1.0, inner.mass / std::max(left.mass, right.mass));
-            const Vec2 d =
-                derivative_at_face({own.xx, own.yx}, {own.xx, shear}, {share * weight * inner.mean.xx, share * weight * inner.mean.yx},
-                                   (to_right ? grid.nodes.vx[node] < 0 : grid.nodes.vx[node] > 0) ? its : 0.0);
+            const bool leads = to_right ? grid.nodes.vx[node] < 0 : grid.nodes.vx[node] > 0;
+            const Vec2 d = derivative_at_face({own.xx, own.yx}, {own.xx, shear},
+                                              {share * weight * inner.mean.xx, share * weight * inner.mean.yx}, leads ? its : 0.0);
             g.xx = (1 - outer) * own.xx + outer * d[0];
             g.yx = (1 - outer) * own.yx + outer * d[1];
         }
@@ -129,9 +129,9 @@ public:
             const int next = to_top ? j + 1 : j - 2;
             const Layer inner = layer(grid, {i, next}, {i - 1, next});
             const double weight = std::min(1.0, inner.mass / std::max(down.mass, up.mass));
-            const Vec2 d =
-                derivative_at_face({own.xy, own.yy}, {shear, own.yy}, {share * weight * inner.mean.xy, share * weight * inner.mean.yy},
-                                   (to_top ? grid.nodes.vy[node] < 0 : grid.nodes.vy[node] > 0) ? its : 0.0);
+            const bool leads = to_top ? grid.nodes.vy[node] < 0 : grid.nodes.vy[node] > 0;
+            const Vec2 d = derivative_at_face({own.xy, own.yy}, {shear, own.yy},
+                                              {share * weight * inner.mean.xy, share * weight * inner.mean.yy}, leads ? its : 0.0);
             g.xy = (1 - outer) * own.xy + outer * d[0];
             g.yy = (1 - outer) * own.yy + outer * d[1];
         }
@@ -198,7 +198,8 @@ private:
     /// That of the next layer. At a face that leads this feeds short waves: there the node's own, which is then the upwind one, as far as
     /// it takes from a strain across the face. In smooth motion that strain falls to what the free face leaves of it, and the two
     /// derivatives to one: whether the face comes or goes then makes no difference.
-    /// @param strain of the node's own gradient, that part of it in which a rotation has no share
+    /// @param strain of the node's own gradient, that part of it in which a rotation has no share @param leads 0 where the face recedes,
+    /// else the share of the node's velocity that counts
     static Vec2 derivative_at_face(const Vec2& own, const Vec2& strain, const Vec2& next, double leads)
     {
         const Vec2 apart{own[0] - next[0], own[1] - next[1]};

@@ -13,16 +13,17 @@ namespace testbed
 /// - stiffness: the isolated cell. Strain is that of the cell, or for a domain the mean of its cells by their shares w, so that the energy
 ///   is at most sum w V (eps_j : D : eps_j): Irons' theorem on cells of content sum w V with a quarter of their mass at each node.
 /// - hourglass: the force takes the velocity of half a step before; a mode that decays at d = 4 rate turns unstable at d dt = 2. In a cell
-/// the
-///   pattern has no stiffness, so that the two limits do not add.
-/// - motion: points that pass cells change the stiffness that nodes see, and what oscillates near the limit then grows.
+///   the pattern has no stiffness, so that the two limits do not add.
+/// - stiffness in motion: the lattice sees waves of a moving body at other frequencies, and near its limit some grow.
 /// - convection: the departure point lies in a cell around the node.
 /// @param hourglass_rate chi c_p / L, zero without [1/s] @param alpha of local damping
 inline std::vector<StepLimit> lpfdm_step_limits(const LpfdmGrid& grid, const std::vector<Body>& bodies, double hourglass_rate, double alpha)
 {
-    // of flights at 0.1 to 0.5 c (nu <= 0.1 where the isolated cell is the limit of the whole lattice) none grew at 0.85 of it, some at 0.9
-    constexpr double in_motion = 0.85, rest = 0.01;  // courant number of what is at rest
+    constexpr double in_motion = 0.65, rest = 0.01;  // of L / c_p, measured: docs/methods.md; Courant number of what is at rest
     const double stiffness = isolated_cell_limit(bodies, grid.lattice.cell_size) * damping_factor(alpha);
+    double crossing = std::numeric_limits<double>::infinity();  // L / c_p over the limit of the isolated cell
+    for (const Body& body : bodies)
+        crossing = std::min(crossing, std::sqrt(gradient_stiffness(moduli(body.material)) / moduli(body.material).constrained()));
     std::vector<StepLimit> limits{{"stiffness", stiffness}};
     if (hourglass_rate > 0)
         limits.push_back({"hourglass", 0.5 / (hourglass_rate * (1 + alpha))});
@@ -30,7 +31,7 @@ inline std::vector<StepLimit> lpfdm_step_limits(const LpfdmGrid& grid, const std
     const double speed = parallel_max(active.size(), [&](std::size_t a)
                                       { return std::max(std::abs(grid.nodes.vx[active[a]]), std::abs(grid.nodes.vy[active[a]])); });
     if (speed * stiffness > rest * grid.lattice.cell_size)
-        limits.push_back({"stiffness in motion", in_motion * stiffness});
+        limits.push_back({"stiffness in motion", in_motion * crossing * stiffness});
     if (const auto courant = courant_limit(grid.lattice.cell_size, speed))
         limits.push_back({"convection", *courant});
     return limits;
