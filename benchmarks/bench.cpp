@@ -134,10 +134,10 @@ void bench(const BenchOptions& options, const MakeSolver& make_solver)
                              laws = options.laws.empty() ? std::vector<std::string>{"elastic", "mohr_coulomb"} : options.laws;
     if (methods.empty())
         for (const Variant& v : variants())
-            if (std::string(v.family) != "fem")
+            if (v.family != Family::fem)
                 methods.emplace_back(v.name);
     for (const std::string& method : methods)
-        if (std::string(find_variant(method).family) == "fem")
+        if (find_variant(method).family == Family::fem)
             throw SceneError("bench: the FEM reference has no particles");
     for (const double points : options.points)
         if (!(points >= 16 && points <= 1e9))

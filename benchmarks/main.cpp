@@ -54,12 +54,12 @@ std::filesystem::path own_directory()
 
 std::unique_ptr<Solver> make_particle_solver(const Scene& scene)
 {
-    return find_variant(scene.method).family == "mpm" ? make_mpm(scene) : make_lpfdm(scene);
+    return family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene);
 }
 
 std::string fields_and_modules(const Scene& scene, Solver& solver)
 {
-    std::vector<std::string> fields, modules{find_variant(scene.method).family};
+    std::vector<std::string> fields, modules{name_of(family_of(scene))};
     for (const Body& body : solver.bodies())
         body.points.for_each_field(
             [&](const auto& f)
@@ -109,14 +109,14 @@ void check(const RunOptions& options, bool resolved)
         fmt::print("{}", resolved_toml(scene));
         return;
     }
-    const bool is_fem = find_variant(scene.method).family == "fem";
+    const bool is_fem = family_of(scene) == Family::fem;
     fmt::print("scene            {}\nmethod           {}\n", scene.path, variant_label(scene));
     fmt::print("lattice          {:.0f} x {:.0f} cells of {} m\n", scene.grid.size[0] / scene.grid.cell_size,
                scene.grid.size[1] / scene.grid.cell_size, scene.grid.cell_size);
     for (const MaterialSpec& m : scene.materials)
     {
         const ElasticModuli moduli(largest_youngs_modulus(scene, m), m.poissons_ratio);
-        fmt::print("material {:<7} {}, M = {:.5g} Pa, c_p = {:.5g} m/s, c_s = {:.5g} m/s\n", m.name, m.law, moduli.constrained(),
+        fmt::print("material {:<7} {}, M = {:.5g} Pa, c_p = {:.5g} m/s, c_s = {:.5g} m/s\n", m.name, name_of(m.law), moduli.constrained(),
                    std::sqrt(moduli.constrained() / m.density), std::sqrt(moduli.shear() / m.density));
     }
     std::size_t points = 0;
@@ -152,7 +152,7 @@ void list()
     for (const Variant& v : variants())
         fmt::print("  {:<16} {}\n", v.name, v.description);
     fmt::print("laws (for `law` of a material)\n");
-    for (const std::string& law : MaterialSpec::laws())
+    for (const std::string& law : names_of<MaterialSpec::Law>())
         fmt::print("  {}\n", law);
 }
 
@@ -221,7 +221,7 @@ int run(int argc, char** argv)
     if (run_command->parsed())
     {
         const std::string method = load_scene(options.scene, options.method, options.overrides).scene.method;
-        if (find_variant(method).family == "fem")
+        if (find_variant(method).family == Family::fem)
             become("testbed-fem", rest_of(argc, argv, 2));
         return static_cast<int>(run_scene(options, make_particle_solver));
     }

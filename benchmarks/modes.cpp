@@ -322,7 +322,7 @@ std::optional<std::pair<std::string, std::string>> modes(const ModesOptions& opt
     if (!output.empty() && output.extension() != ".h5" && output.extension() != ".csv" && output.extension() != ".png")
         throw SceneError(fmt::format("modes: '{}' is none of .h5, .csv, .png", output.string()));
     const Scene scene = load_and_warn(options.scene);
-    if (std::string(find_variant(scene.method).family) == "fem")
+    if (family_of(scene) == Family::fem)
         throw SceneError("modes: the FEM reference has no state that is stepped by particles; take an LPFDM or MPM method");
     const std::unique_ptr<Solver> solver = make_solver(scene);
     const Findings f = [&]

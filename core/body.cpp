@@ -113,7 +113,7 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
                 fmt::format("{}: body '{}' has no points; it is smaller than the spacing of its points", scene.path, spec.name));
         MaterialSpec material = scene.material(spec.material);
         if (material.has_strength() && !needs.strength)
-            material.law = "linear_elastic";
+            material.law = MaterialSpec::Law::linear_elastic;
         const std::size_t n = positions.size();
         const PointParameters parameters = read_parameters(scene, spec, material, positions, next_id);
         const Varying varying = parameters.varying();

@@ -28,18 +28,18 @@ struct Method
 {
     bool is_mpm, point_support, linear, b_bar;
     double hourglass;
-    std::string scheme;
+    bool usl;
 };
 
 Method method_of(const Scene& scene)
 {
-    const bool mpm = find_variant(scene.method).family == "mpm";
+    const bool mpm = family_of(scene) == Family::mpm;
     return {mpm,
-            !mpm && scene.lpfdm.support == "point",
-            mpm && scene.mpm.shape == "linear",
-            mpm && scene.mpm.strain == "b_bar",
+            !mpm && scene.lpfdm.support == LpfdmSpec::Support::point,
+            mpm && scene.mpm.shape == MpmSpec::Shape::linear,
+            mpm && scene.mpm.strain == MpmSpec::Strain::b_bar,
             mpm ? 0 : scene.lpfdm.hourglass,
-            mpm ? scene.mpm.scheme : ""};
+            mpm && scene.mpm.scheme == MpmSpec::Scheme::usl};
 }
 
 /// A support by domains, for methods that have none.
@@ -53,7 +53,7 @@ std::string null_mode_remedy(const Scene& scene, const Method& m)
     if (!m.is_mpm)
         return m.hourglass == 0 ? "lpfdm.hourglass=0.05" : "";
     if (m.linear)
-        return scene.mpm.null_space_filter == "none" ? "mpm.null_space_filter=cell" : "";
+        return scene.mpm.null_space_filter == MpmSpec::Filter::none ? "mpm.null_space_filter=cell" : "";
     return scene.mpm.flip == 1 ? "mpm.flip=0.99" : "";
 }
 
@@ -61,7 +61,9 @@ std::string sliver_remedy(const Scene& scene, const Method& m)
 {
     if (m.is_mpm)
         return scene.mpm.mass_cutoff < sliver_mass ? "mpm.mass_cutoff=0.001" : "";
-    return m.point_support ? wider_support(m) : scene.lpfdm.convection != "two_sided" ? "lpfdm.convection=two_sided" : "";
+    return m.point_support                                              ? wider_support(m)
+           : scene.lpfdm.convection != LpfdmSpec::Convection::two_sided ? "lpfdm.convection=two_sided"
+                                                                        : "";
 }
 
 /// The time step times a share, as the scene gives it.
@@ -196,7 +198,7 @@ Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& fac
         return {"null_mode", null_mode_remedy(scene, m)};
     if (largest_volume_ratio(bodies) > grown)
         return {"tension", m.point_support && scene.lpfdm.volume_cap == 0 ? "lpfdm.volume_cap=2.0" : ""};
-    if (m.scheme == "usl")
+    if (m.usl)
         return {"sliver", "mpm.scheme=musl"};
     if (mass_of_fastest(*nodes, full_mass(bodies, lattice->cell_size)) < sliver_mass)
         return {"sliver", sliver_remedy(scene, m)};

@@ -111,7 +111,7 @@ class NoiseGuard final : public Guard
 public:
     explicit NoiseGuard(const Scene& scene) : is_free_(scene.boundaries.empty() && scene.walls.empty()), lattice_(make_lattice(scene.grid))
     {
-        const bool fem = find_variant(scene.method).family == "fem";
+        const bool fem = family_of(scene) == Family::fem;
         mesh_ = scene.grid.cell_size / (fem ? std::pow(2.0, scene.fem.refinements) : 1.0);
     }
     void watch(const GuardSample& s, const Solver&) override
@@ -177,11 +177,7 @@ CellKey cell_of(const Lattice& lattice, const Points& q, std::size_t p)
 class CrossingGuard final : public Guard
 {
 public:
-    explicit CrossingGuard(const Scene& scene)
-        : lattice_(make_lattice(scene.grid)),
-          shares_cells_(find_variant(scene.method).family == "lpfdm")
-    {
-    }
+    explicit CrossingGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)), shares_cells_(family_of(scene) == Family::lpfdm) {}
     void watch(const GuardSample&, const Solver& solver) override
     {
         if (at_start_.empty())
@@ -337,10 +333,10 @@ std::vector<std::unique_ptr<Guard>> field_guards(const Scene& scene)
     if (scene.may_flow())
         return guards;
     guards.push_back(std::make_unique<NoiseGuard>(scene));
-    const std::string family = find_variant(scene.method).family;
-    if (family == "fem")
+    const Family family = family_of(scene);
+    if (family == Family::fem)
         return guards;
-    if (family == "mpm" ? scene.mpm.shape == "linear" : scene.lpfdm.support == "point")
+    if (family == Family::mpm ? scene.mpm.shape == MpmSpec::Shape::linear : scene.lpfdm.support == LpfdmSpec::Support::point)
         guards.push_back(std::make_unique<CrossingGuard>(scene));
     if (scene.bodies.size() > 1)
         guards.push_back(std::make_unique<MixedCellsGuard>(scene));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
+#include <stdexcept>
 
 namespace testbed
 {
@@ -23,7 +24,7 @@ std::vector<Vec2> pattern(const BodySpec& body, const GridSpec& grid, const std:
 {
     const double h = spacing(body, grid);
     Vec2 corner = grid.origin, size = grid.size;
-    if (body.shape == "box")
+    if (body.shape == BodySpec::Shape::box)
     {
         corner = *body.min;
         size = {(*body.max)[0] - corner[0], (*body.max)[1] - corner[1]};
@@ -44,12 +45,15 @@ std::vector<Vec2> pattern(const BodySpec& body, const GridSpec& grid, const std:
 
 bool contains(const BodySpec& body, const Vec2& p, double slack)
 {
-    if (body.shape == "disk")
-        return std::hypot(p[0] - (*body.center)[0], p[1] - (*body.center)[1]) <= *body.radius + slack;
-    if (body.shape == "polygon")
-        return inside_polygon(body.vertices, p);
-    return p[0] >= (*body.min)[0] - slack && p[0] <= (*body.max)[0] + slack && p[1] >= (*body.min)[1] - slack &&
-           p[1] <= (*body.max)[1] + slack;
+    switch (body.shape)
+    {
+    case BodySpec::Shape::box:
+        return p[0] >= (*body.min)[0] - slack && p[0] <= (*body.max)[0] + slack && p[1] >= (*body.min)[1] - slack &&
+               p[1] <= (*body.max)[1] + slack;
+    case BodySpec::Shape::disk: return std::hypot(p[0] - (*body.center)[0], p[1] - (*body.center)[1]) <= *body.radius + slack;
+    case BodySpec::Shape::polygon: return inside_polygon(body.vertices, p);
+    }
+    throw std::logic_error("not a shape");
 }
 
 std::optional<std::array<std::size_t, 2>> crossing_edges(const std::vector<Vec2>& v)
@@ -69,37 +73,48 @@ std::optional<std::array<std::size_t, 2>> crossing_edges(const std::vector<Vec2>
 
 std::array<Vec2, 2> extent(const BodySpec& body)
 {
-    if (body.shape == "box")
-        return {*body.min, *body.max};
-    if (body.shape == "disk")
+    switch (body.shape)
+    {
+    case BodySpec::Shape::box: return {*body.min, *body.max};
+    case BodySpec::Shape::disk:
     {
         const Vec2& center = *body.center;
         const double r = *body.radius;
         return {Vec2{center[0] - r, center[1] - r}, Vec2{center[0] + r, center[1] + r}};
     }
-    std::array<Vec2, 2> box{body.vertices[0], body.vertices[0]};
-    for (const Vec2& v : body.vertices)
-        for (std::size_t k = 0; k < 2; ++k)
-        {
-            box[0][k] = std::min(box[0][k], v[k]);
-            box[1][k] = std::max(box[1][k], v[k]);
-        }
-    return box;
+    case BodySpec::Shape::polygon:
+    {
+        std::array<Vec2, 2> box{body.vertices[0], body.vertices[0]};
+        for (const Vec2& v : body.vertices)
+            for (std::size_t k = 0; k < 2; ++k)
+            {
+                box[0][k] = std::min(box[0][k], v[k]);
+                box[1][k] = std::max(box[1][k], v[k]);
+            }
+        return box;
+    }
+    }
+    throw std::logic_error("not a shape");
 }
 
 std::vector<Vec2> outline(const BodySpec& body)
 {
-    if (body.shape == "polygon")
-        return body.vertices;
-    if (body.shape == "box")
-        return {*body.min, {(*body.max)[0], (*body.min)[1]}, *body.max, {(*body.min)[0], (*body.max)[1]}};
-    std::vector<Vec2> circle;
-    for (int k = 0; k < 64; ++k)
+    switch (body.shape)
     {
-        const double angle = 2 * std::numbers::pi * k / 64;
-        circle.push_back({(*body.center)[0] + *body.radius * std::cos(angle), (*body.center)[1] + *body.radius * std::sin(angle)});
+    case BodySpec::Shape::box: return {*body.min, {(*body.max)[0], (*body.min)[1]}, *body.max, {(*body.min)[0], (*body.max)[1]}};
+    case BodySpec::Shape::polygon: return body.vertices;
+    case BodySpec::Shape::disk:
+    {
+        std::vector<Vec2> circle;
+        for (int k = 0; k < 64; ++k)
+        {
+            const double angle = 2 * std::numbers::pi * k / 64;
+            circle.push_back({(*body.center)[0] + *body.radius * std::cos(angle), (*body.center)[1] + *body.radius * std::sin(angle)});
+        }
+        return circle;
     }
-    return circle;
+    }
+    throw std::logic_error("not a shape");
 }
 
 std::vector<Vec2> fill(const Scene& scene, const BodySpec& body)

@@ -309,9 +309,9 @@ bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach)
 
 int reach_of(const Scene& scene)
 {
-    if (find_variant(scene.method).family == "mpm")
-        return scene.mpm.shape == "linear" ? 1 : 2;
-    return scene.lpfdm.support == "point" ? 1 : 2;
+    if (family_of(scene) == Family::mpm)
+        return scene.mpm.shape == MpmSpec::Shape::linear ? 1 : 2;
+    return scene.lpfdm.support == LpfdmSpec::Support::point ? 1 : 2;
 }
 
 Guards::Guards(const Scene& scene, const Solver& solver, double dt_critical)

@@ -7,7 +7,6 @@
 
 #include <array>
 #include <span>
-#include <string_view>
 #include <vector>
 
 namespace testbed
@@ -35,12 +34,6 @@ struct StrainIncrement
         return T(1.0) + d * (T(1.0) + T(theta) * d);
     }
 };
-
-/// @param name of a scene's `increment`
-inline StrainIncrement strain_increment(std::string_view name)
-{
-    return {name == "forward" ? 0.0 : 0.5};
-}
 
 /// Area of a polygon whose corners run anticlockwise [m^2].
 inline double polygon_area(std::span<const Vec2> x)

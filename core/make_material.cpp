@@ -14,7 +14,7 @@ Material elastic(const ElasticModuli& moduli, bool varies)
 
 Softening make_softening(const SofteningSpec& spec, double cell_size)
 {
-    if (spec.kind == "drop")
+    if (spec.kind == SofteningSpec::Kind::drop)
         return Softening::drop(spec.residual);
     const double scaling = spec.band_thickness ? cell_size / *spec.band_thickness : 1;
     return Softening::linear(spec.residual, *spec.strain / scaling);
@@ -40,12 +40,13 @@ Material mohr_coulomb(const MaterialSpec& spec, const ElasticModuli& moduli, con
 
 Material make_material(const MaterialSpec& spec, const ElasticModuli& moduli, const Strength<>& strength, double cell_size, Varying varying)
 {
-    if (spec.has_strength())
-        return mohr_coulomb(spec, moduli, strength, cell_size, varying.strength);
-    if (spec.law == "linear_elastic")
-        return elastic<LinearElastic>(moduli, varying.stiffness);
-    if (spec.law == "hypoelastic_jaumann")
-        return elastic<HypoelasticJaumann>(moduli, varying.stiffness);
-    return elastic<HypoelasticExactRotation>(moduli, varying.stiffness);
+    switch (spec.law)
+    {
+    case MaterialSpec::Law::linear_elastic: return elastic<LinearElastic>(moduli, varying.stiffness);
+    case MaterialSpec::Law::hypoelastic_jaumann: return elastic<HypoelasticJaumann>(moduli, varying.stiffness);
+    case MaterialSpec::Law::hypoelastic_exact_rotation: return elastic<HypoelasticExactRotation>(moduli, varying.stiffness);
+    case MaterialSpec::Law::mohr_coulomb: return mohr_coulomb(spec, moduli, strength, cell_size, varying.strength);
+    }
+    throw std::logic_error("not a law");
 }
 }  // namespace testbed

@@ -16,9 +16,9 @@ Restraint make_boundary(const BoundarySpec& spec, const Scene& scene, const Latt
             const Vec2 x = lattice.node_position({i, j});
             if (!holds_near(where, x[0], x[1], 1e-6 * lattice.cell_size))
                 continue;
-            if (spec.fix != "y")
+            if (fixes(spec.fix, 0))
                 restraint.components[0].nodes.push_back({i, j});
-            if (spec.fix != "x")
+            if (fixes(spec.fix, 1))
                 restraint.components[1].nodes.push_back({i, j});
         }
     if (restraint.components[0].empty() && restraint.components[1].empty())

@@ -43,7 +43,7 @@ struct Gravity
 
 inline Gravity make_gravity(const GravitySpec& spec)
 {
-    return {spec.acceleration, spec.ramp, spec.profile == "linear"};
+    return {spec.acceleration, spec.ramp, spec.profile == GravitySpec::Profile::linear};
 }
 
 /// Eq. (15), local non-viscous damping: F -= alpha |F| sgn(v), alpha in [0, 1).

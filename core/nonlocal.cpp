@@ -5,7 +5,7 @@ namespace testbed
 double nonlocal_weight(const NonlocalSpec& spec, double r)
 {
     const double s = r / spec.internal_length;
-    return (spec.weight == "gauss" ? 1 : s) * std::exp(-s * s);
+    return (spec.weight == NonlocalSpec::Weight::gauss ? 1 : s) * std::exp(-s * s);
 }
 
 NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size)

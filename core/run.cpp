@@ -182,7 +182,7 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
     file.attribute("/", "format_version", std::int64_t{1});
     file.attribute("/", "case", scene.case_name());
     file.attribute("/", "title", scene.title);
-    file.attribute("/", "method", find_variant(scene.method).family);
+    file.attribute("/", "method", name_of(family_of(scene)));
     file.attribute("/", "variant", variant_label(scene));
     file.attribute("/", "kinematics", std::string(solver.kinematics()));
     file.attribute("/scene", "resolved", resolved_toml(scene));
@@ -206,7 +206,7 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
     {
         const ElasticModuli moduli(largest_youngs_modulus(scene, m), m.poissons_ratio);
         const std::string group = "/materials/" + m.name;
-        file.attribute(group, "law", m.law);
+        file.attribute(group, "law", name_of(m.law));
         file.attribute(group, "density", m.density);
         file.attribute(group, "youngs_modulus", moduli.youngs_modulus());
         file.attribute(group, "poissons_ratio", moduli.poissons_ratio());

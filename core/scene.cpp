@@ -255,22 +255,21 @@ LoadedScene load_scene_text(const std::string& text, const std::string& path, co
 const std::vector<Variant>& variants()
 {
     static const std::vector<Variant> list{
-        {"lpfdm-2000", "lpfdm", "as published: a point belongs to one cell, upwind convection, no hourglass control",
+        {"lpfdm-2000", Family::lpfdm, "as published: a point belongs to one cell, upwind convection, no hourglass control",
          [](Scene& s) {
-             s.lpfdm = {"point", "upwind", "extrapolate", 0.0};
+             s.lpfdm = {LpfdmSpec::Support::point, LpfdmSpec::Convection::upwind, LpfdmSpec::Frontier::extrapolate, 0.0};
          }},
-        {"lpfdm", "lpfdm", "each point has a domain, convection on both sides of the forces, hourglass control",
+        {"lpfdm", Family::lpfdm, "each point has a domain, convection on both sides of the forces, hourglass control",
          [](Scene& s) { s.lpfdm = LpfdmSpec{}; }},
-        {"mpm-linear", "mpm", "linear shape functions, strain at each point, FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.shape = "linear", .scheme = "musl", .strain = "four_point"}; }},
-        {"mpm-linear-bbar", "mpm", "linear shape functions, volumetric strain averaged over each cell, FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.shape = "linear", .scheme = "musl", .strain = "b_bar"}; }},
-        {"mpm-bspline", "mpm", "quadratic B-splines, linear at the edges of the lattice; FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.shape = "bspline", .scheme = "musl", .strain = "four_point", .mass_cutoff = 1e-14}; }},
-        {"mpm-cpgimp", "mpm", "contiguous-particle GIMP: each point's box stretches with it; FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.shape = "cpgimp", .scheme = "musl", .strain = "four_point", .mass_cutoff = 1e-14}; }},
-        {"fem-q1", "fem", "small-strain reference, bilinear elements", [](Scene& s) { s.fem.degree = 1; }},
-        {"fem-q2", "fem", "small-strain reference, biquadratic elements", [](Scene& s) { s.fem.degree = 2; }},
+        {"mpm-linear", Family::mpm, "linear shape functions, strain at each point, FLIP, MUSL", [](Scene& s) { s.mpm = MpmSpec{}; }},
+        {"mpm-linear-bbar", Family::mpm, "linear shape functions, volumetric strain averaged over each cell, FLIP, MUSL",
+         [](Scene& s) { s.mpm = {.strain = MpmSpec::Strain::b_bar}; }},
+        {"mpm-bspline", Family::mpm, "quadratic B-splines, linear at the edges of the lattice; FLIP, MUSL",
+         [](Scene& s) { s.mpm = {.shape = MpmSpec::Shape::bspline, .mass_cutoff = 1e-14}; }},
+        {"mpm-cpgimp", Family::mpm, "contiguous-particle GIMP: each point's box stretches with it; FLIP, MUSL",
+         [](Scene& s) { s.mpm = {.shape = MpmSpec::Shape::cpgimp, .mass_cutoff = 1e-14}; }},
+        {"fem-q1", Family::fem, "small-strain reference, bilinear elements", [](Scene& s) { s.fem.degree = 1; }},
+        {"fem-q2", Family::fem, "small-strain reference, biquadratic elements", [](Scene& s) { s.fem.degree = 2; }},
     };
     return list;
 }

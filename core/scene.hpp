@@ -2,6 +2,7 @@
 /// A scene: what is computed, with which method. The describe() of each struct is at once the parser, the strict check of keys,
 /// `testbed doc` and the writer of the resolved scene.
 
+#include "core/choice.hpp"
 #include "core/expression.hpp"
 #include "core/material_spec.hpp"
 #include "core/types.hpp"
@@ -15,6 +16,43 @@
 namespace testbed
 {
 using Expr2 = std::array<std::string, 2>;
+
+/// Components of a velocity.
+enum class Fix
+{
+    x,
+    y,
+    xy
+};
+constexpr auto names(Fix)
+{
+    return choice_names<Fix>({{Fix::x, "x"}, {Fix::y, "y"}, {Fix::xy, "xy"}});
+}
+constexpr bool fixes(Fix fix, std::size_t component)
+{
+    return fix == Fix::xy || fix == (component == 0 ? Fix::x : Fix::y);
+}
+
+/// Of a box.
+enum class Face
+{
+    left,
+    right,
+    bottom,
+    top
+};
+constexpr auto names(Face)
+{
+    return choice_names<Face>({{Face::left, "left"}, {Face::right, "right"}, {Face::bottom, "bottom"}, {Face::top, "top"}});
+}
+constexpr std::size_t normal_of(Face face)
+{
+    return face == Face::left || face == Face::right ? 0 : 1;
+}
+constexpr bool is_low(Face face)
+{
+    return face == Face::left || face == Face::bottom;
+}
 
 struct GridSpec
 {
@@ -57,16 +95,23 @@ struct TimeSpec
 
 struct GravitySpec
 {
+    enum class Profile
+    {
+        smooth,
+        linear
+    };
+    friend constexpr auto names(Profile) { return choice_names<Profile>({{Profile::smooth, "smooth"}, {Profile::linear, "linear"}}); }
+
     Vec2 acceleration{0, 0};
     double ramp = 0;
-    std::string profile = "smooth";
+    Profile profile = Profile::smooth;
 
     template <class V>
     void describe(V& v)
     {
         v.required("acceleration", acceleration, "m/s^2", "full value");
         v.optional("ramp", ramp, "s", "time over which it grows from zero; 0 applies it at once");
-        v.choice("profile", profile, {"smooth", "linear"}, "of the ramp: (1 - cos)/2, or linear for loading to failure");
+        v.choice("profile", profile, "of the ramp: (1 - cos)/2, or linear for loading to failure");
     }
 };
 
@@ -83,7 +128,19 @@ struct DampingSpec
 
 struct BodySpec
 {
-    std::string name, material, shape, inside;
+    enum class Shape
+    {
+        box,
+        disk,
+        polygon
+    };
+    friend constexpr auto names(Shape)
+    {
+        return choice_names<Shape>({{Shape::box, "box"}, {Shape::disk, "disk"}, {Shape::polygon, "polygon"}});
+    }
+
+    std::string name, material, inside;
+    Shape shape = Shape::box;
     int points_per_cell = 4;
     std::optional<Vec2> min, max, center;
     std::optional<double> radius;
@@ -96,7 +153,7 @@ struct BodySpec
     {
         v.required("name", name, "", "name of the body (the paper's cluster)");
         v.required("material", material, "", "name of a material");
-        v.choice("shape", shape, {"box", "disk", "polygon"}, "box: min, max; disk: center, radius; polygon: vertices");
+        v.required_choice("shape", shape, "box: min, max; disk: center, radius; polygon: vertices");
         v.optional("points_per_cell", points_per_cell, "-", "per direction; the points stand in a square pattern");
         v.optional("min", min, "m", "box: lower left corner; the points start from here, wherever it lies in a cell");
         v.optional("max", max, "m", "box: upper right corner; the extent is a multiple of L");
@@ -111,21 +168,31 @@ struct BodySpec
 
 struct BoundarySpec
 {
-    std::string name, where, fix;
+    std::string name, where;
+    Fix fix = Fix::xy;
 
     template <class V>
     void describe(V& v)
     {
         v.required("name", name, "", "name of the boundary");
         v.expression("where", where, "x, y", "", "condition on the positions of nodes, such as \"y <= 0\"");
-        v.choice("fix", fix, {"x", "y", "xy"}, "velocity components held at zero; one component makes a roller");
+        v.required_choice("fix", fix, "velocity components held at zero; one component makes a roller");
     }
 };
 
 /// A rigid block (or plate, if min and max agree in one coordinate) that holds or drives the nodes it covers.
 struct WallSpec
 {
-    std::string name, fix = "xy", motion = "hand_off";
+    enum class Motion
+    {
+        hand_off,
+        smooth
+    };
+    friend constexpr auto names(Motion) { return choice_names<Motion>({{Motion::hand_off, "hand_off"}, {Motion::smooth, "smooth"}}); }
+
+    std::string name;
+    Fix fix = Fix::xy;
+    Motion motion = Motion::hand_off;
     Vec2 min{0, 0}, max{0, 0};
     std::optional<Expr2> velocity;
     std::optional<Vec2> door;
@@ -138,8 +205,8 @@ struct WallSpec
         v.required("min", min, "m", "lower left corner at the start; half a cell of soil beside a wall moves with it, see docs/methods.md");
         v.required("max", max, "m", "upper right corner; equal to min in one coordinate makes a plate");
         v.expression("velocity", velocity, "t", "m/s", "two expressions; absent: an obstacle");
-        v.choice("fix", fix, {"x", "y", "xy"}, "velocity components that soil at the wall shares; xy is rough, one is smooth");
-        v.choice("motion", motion, {"hand_off", "smooth"},
+        v.choice("fix", fix, "velocity components that soil at the wall shares; xy is rough, one is smooth");
+        v.choice("motion", motion,
                  "hand_off: after each cell of travel the next line of nodes is driven, as published; smooth: the velocity interpolated "
                  "at the wall's face is driven; both pull soil that they leave");
         v.optional("door", door, "m", "an opening, from .. to along the longer side; the soil half a cell within its ends is held");
@@ -160,7 +227,8 @@ struct ConfinementSpec
 
 struct TractionSpec
 {
-    std::string name, body, face;
+    std::string name, body;
+    Face face = Face::left;
     Expr2 traction{"0", "0"};
 
     template <class V>
@@ -168,7 +236,7 @@ struct TractionSpec
     {
         v.required("name", name, "", "name of the traction");
         v.required("body", body, "", "name of a box");
-        v.choice("face", face, {"left", "right", "bottom", "top"}, "of the box; its outermost row of points carries the load");
+        v.required_choice("face", face, "of the box; its outermost row of points carries the load");
         v.expression("traction", traction, "X, Y, x, y, t", "Pa", "two expressions: force per area of the initial face");
     }
 };
@@ -256,20 +324,53 @@ struct ReportSpec
 
 struct LpfdmSpec
 {
-    std::string support = "domain", convection = "two_sided", frontier = "arrival";
+    enum class Support
+    {
+        point,
+        domain
+    };
+    friend constexpr auto names(Support) { return choice_names<Support>({{Support::point, "point"}, {Support::domain, "domain"}}); }
+    enum class Convection
+    {
+        upwind,
+        central,
+        two_sided,
+        none
+    };
+    friend constexpr auto names(Convection)
+    {
+        return choice_names<Convection>({{Convection::upwind, "upwind"},
+                                         {Convection::central, "central"},
+                                         {Convection::two_sided, "two_sided"},
+                                         {Convection::none, "none"}});
+    }
+    enum class Frontier
+    {
+        extrapolate,
+        literal,
+        arrival
+    };
+    friend constexpr auto names(Frontier)
+    {
+        return choice_names<Frontier>(
+            {{Frontier::extrapolate, "extrapolate"}, {Frontier::literal, "literal"}, {Frontier::arrival, "arrival"}});
+    }
+
+    Support support = Support::domain;
+    Convection convection = Convection::two_sided;
+    Frontier frontier = Frontier::arrival;
     double hourglass = 0.05, volume_cap = 0;
 
     template <class V>
     void describe(V& v)
     {
-        v.choice("support", support, {"point", "domain"},
-                 "point: a point belongs to one cell; domain: its box spreads over the cells that it overlaps");
+        v.choice("support", support, "point: a point belongs to one cell; domain: its box spreads over the cells that it overlaps");
         v.choice(
-            "convection", convection, {"upwind", "central", "two_sided", "none"},
+            "convection", convection,
             "form of eq. (13); two_sided: central, from the next layer of cells where one side has no material, half of it before and half "
             "after the forces, strain and position at the middle of the step");
         v.choice(
-            "frontier", frontier, {"extrapolate", "literal", "arrival"},
+            "frontier", frontier,
             "velocity of nodes reached for the first time: mean of neighbours, or zero; arrival: whenever mass arrives at a free face, "
             "it brings its velocity");
         v.optional("hourglass", hourglass, "-", "coefficient chi of the viscous hourglass force, at most 0.5; 0 leaves it out");
@@ -282,25 +383,76 @@ struct LpfdmSpec
 
 struct MpmSpec
 {
-    std::string shape = "linear", scheme = "musl", strain = "four_point", increment = "midpoint";
+    enum class Shape
+    {
+        linear,
+        bspline,
+        cpgimp
+    };
+    friend constexpr auto names(Shape)
+    {
+        return choice_names<Shape>({{Shape::linear, "linear"}, {Shape::bspline, "bspline"}, {Shape::cpgimp, "cpgimp"}});
+    }
+    enum class Scheme
+    {
+        usl,
+        usf,
+        musl
+    };
+    friend constexpr auto names(Scheme)
+    {
+        return choice_names<Scheme>({{Scheme::usl, "usl"}, {Scheme::usf, "usf"}, {Scheme::musl, "musl"}});
+    }
+    enum class Strain
+    {
+        four_point,
+        b_bar
+    };
+    friend constexpr auto names(Strain) { return choice_names<Strain>({{Strain::four_point, "four_point"}, {Strain::b_bar, "b_bar"}}); }
+    enum class Increment
+    {
+        midpoint,
+        forward
+    };
+    friend constexpr auto names(Increment)
+    {
+        return choice_names<Increment>({{Increment::midpoint, "midpoint"}, {Increment::forward, "forward"}});
+    }
+    enum class Transfer
+    {
+        flip,
+        xpic
+    };
+    friend constexpr auto names(Transfer) { return choice_names<Transfer>({{Transfer::flip, "flip"}, {Transfer::xpic, "xpic"}}); }
+    enum class Filter
+    {
+        none,
+        cell
+    };
+    friend constexpr auto names(Filter) { return choice_names<Filter>({{Filter::none, "none"}, {Filter::cell, "cell"}}); }
+
+    Shape shape = Shape::linear;
+    Scheme scheme = Scheme::musl;
+    Strain strain = Strain::four_point;
+    Increment increment = Increment::midpoint;
     double flip = 1;
-    std::string transfer = "flip";
+    Transfer transfer = Transfer::flip;
     int xpic_order = 2;
-    std::string null_space_filter = "none";
+    Filter null_space_filter = Filter::none;
     double mass_cutoff = 1e-7;
 
     template <class V>
     void describe(V& v)
     {
-        v.choice("shape", shape, {"linear", "bspline", "cpgimp"}, "nodal shape functions as seen by the points");
-        v.choice("scheme", scheme, {"usl", "usf", "musl"}, "stress update last, first, or last with remapped velocity");
-        v.choice("strain", strain, {"four_point", "b_bar"}, "strain at each point, or with the cell's mean volumetric strain");
-        v.choice("increment", increment, {"midpoint", "forward"},
+        v.choice("shape", shape, "nodal shape functions as seen by the points");
+        v.choice("scheme", scheme, "stress update last, first, or last with remapped velocity");
+        v.choice("strain", strain, "strain at each point, or with the cell's mean volumetric strain");
+        v.choice("increment", increment,
                  "strain over the configuration at the middle of the step, second order, or at its start, first order");
-        v.choice("transfer", transfer, {"flip", "xpic"}, "velocity update of the points: FLIP blended with PIC, or XPIC(m)");
+        v.choice("transfer", transfer, "velocity update of the points: FLIP blended with PIC, or XPIC(m)");
         v.optional("flip", flip, "-", "share of FLIP in transfer = \"flip\", the rest is PIC; in [0, 1]");
         v.optional("xpic_order", xpic_order, "-", "m of transfer = \"xpic\": 1 is PIC; a larger one keeps more of what the nodes see");
-        v.choice("null_space_filter", null_space_filter, {"none", "cell"},
+        v.choice("null_space_filter", null_space_filter,
                  "cell: takes from the velocity of a cell's points what its nodes do not see; needs shape = \"linear\"");
         v.optional(
             "mass_cutoff", mass_cutoff, "-",
@@ -311,16 +463,37 @@ struct MpmSpec
 
 struct FemSpec
 {
+    enum class Analysis
+    {
+        by_scene,
+        statics,
+        dynamics
+    };
+    friend constexpr auto names(Analysis)
+    {
+        return choice_names<Analysis>({{Analysis::by_scene, "auto"}, {Analysis::statics, "static"}, {Analysis::dynamics, "dynamic"}});
+    }
+    enum class Integrator
+    {
+        newmark,
+        central_difference
+    };
+    friend constexpr auto names(Integrator)
+    {
+        return choice_names<Integrator>({{Integrator::newmark, "newmark"}, {Integrator::central_difference, "central_difference"}});
+    }
+
     int degree = 2, refinements = 0;
-    std::string analysis = "auto", integrator = "newmark";
+    Analysis analysis = Analysis::by_scene;
+    Integrator integrator = Integrator::newmark;
 
     template <class V>
     void describe(V& v)
     {
         v.optional("degree", degree, "-", "1 (Q1) or 2 (Q2)");
         v.optional("refinements", refinements, "-", "global refinements of the lattice mesh");
-        v.choice("analysis", analysis, {"auto", "static", "dynamic"}, "auto: static if the scene is damped or ramped, else dynamic");
-        v.choice("integrator", integrator, {"newmark", "central_difference"}, "dynamic: average acceleration, or explicit");
+        v.choice("analysis", analysis, "auto: static if the scene is damped or ramped, else dynamic");
+        v.choice("integrator", integrator, "dynamic: average acceleration, or explicit");
     }
 };
 
@@ -386,14 +559,31 @@ struct Scene
     Constants expression_constants() const;
 };
 
-/// A variant is a family (lpfdm, mpm, fem) with a named set of options.
+enum class Family
+{
+    lpfdm,
+    mpm,
+    fem
+};
+constexpr auto names(Family)
+{
+    return choice_names<Family>({{Family::lpfdm, "lpfdm"}, {Family::mpm, "mpm"}, {Family::fem, "fem"}});
+}
+
+/// A family with a named set of options.
 struct Variant
 {
-    std::string name, family, description;
+    std::string name;
+    Family family;
+    std::string description;
     void (*apply)(Scene&);
 };
 const std::vector<Variant>& variants();
 const Variant& find_variant(const std::string& name);
+inline Family family_of(const Scene& scene)
+{
+    return find_variant(scene.method).family;
+}
 
 /// The name of the scene's variant, with the options that the scene changes in brackets.
 std::string variant_label(const Scene& scene);

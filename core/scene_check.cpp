@@ -46,16 +46,16 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
     const auto refuse = [&](bool present, const char* name)
     {
         if (present)
-            problems.add(key + "." + name, fmt::format("not used by shape '{}'", body.shape));
+            problems.add(key + "." + name, fmt::format("not used by shape '{}'", name_of(body.shape)));
     };
     const auto ask = [&](bool present, const char* name)
     {
         if (!present)
-            problems.add(key + "." + name, fmt::format("missing, shape '{}' needs it", body.shape));
+            problems.add(key + "." + name, fmt::format("missing, shape '{}' needs it", name_of(body.shape)));
         return present;
     };
     bool known = false;
-    if (body.shape == "box")
+    if (body.shape == BodySpec::Shape::box)
     {
         const bool has_min = ask(body.min.has_value(), "min"), has_max = ask(body.max.has_value(), "max");
         refuse(body.center.has_value(), "center");
@@ -69,7 +69,7 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
                 problems.add(key + ".max",
                              fmt::format("the extent {} m in {} is not a multiple of the cell size {} m", length, "xy"[k], grid.cell_size));
     }
-    else if (body.shape == "disk")
+    else if (body.shape == BodySpec::Shape::disk)
     {
         const bool has_center = ask(body.center.has_value(), "center"), has_radius = ask(body.radius.has_value(), "radius");
         refuse(body.min.has_value(), "min");
@@ -79,7 +79,7 @@ void check_body(const Scene& scene, const BodySpec& body, const std::string& key
             problems.add(key + ".radius", "must be positive");
         known = has_center && has_radius;
     }
-    else if (body.shape == "polygon")
+    else if (body.shape == BodySpec::Shape::polygon)
     {
         refuse(body.min.has_value(), "min");
         refuse(body.max.has_value(), "max");
@@ -206,7 +206,7 @@ void check_strength(const Scene& scene, const MaterialSpec& m, const std::string
     const auto refuse = [&](bool present, const char* name)
     {
         if (present)
-            problems.add(key + "." + name, fmt::format("not used by law '{}'", m.law));
+            problems.add(key + "." + name, fmt::format("not used by law '{}'", name_of(m.law)));
     };
     if (!m.has_strength())
     {
@@ -216,9 +216,9 @@ void check_strength(const Scene& scene, const MaterialSpec& m, const std::string
         return;
     }
     if (!m.strength)
-        return problems.add(key + ".strength", fmt::format("missing, law '{}' needs it", m.law));
+        return problems.add(key + ".strength", fmt::format("missing, law '{}' needs it", name_of(m.law)));
     if (!is_number(m.youngs_modulus))
-        problems.add(key + ".youngs_modulus", fmt::format("law '{}' takes a plain number, not an expression", m.law));
+        problems.add(key + ".youngs_modulus", fmt::format("law '{}' takes a plain number, not an expression", name_of(m.law)));
     const std::string angle_rule = "an angle in radians, from 0 to below pi/2, is asked (degrees: \"28.6*pi/180\")";
     const double right_angle = 0.5 * std::numbers::pi;
     check_number(
@@ -244,7 +244,7 @@ void check_strength(const Scene& scene, const MaterialSpec& m, const std::string
     if (m.softening)
     {
         const SofteningSpec& s = *m.softening;
-        const bool linear = s.kind == "linear";
+        const bool linear = s.kind == SofteningSpec::Kind::linear;
         if (!(s.residual >= 0 && s.residual <= 1))
             problems.add(key + ".softening.residual", fmt::format("a share in [0, 1] is asked, not {}", s.residual));
         if (linear && !s.strain)
@@ -282,7 +282,7 @@ void check_strength(const Scene& scene, const MaterialSpec& m, const std::string
             if (!(value >= 0 && value <= 2))
                 problems.add(key + ".random." + name, fmt::format("a relative deviation in [0, 2] is asked, not {}", value));
         positive(r.correlation_length, ".random.correlation_length");
-        if ((r.field == "correlated") != r.correlation_length.has_value())
+        if ((r.field == RandomSpec::RandomField::correlated) != r.correlation_length.has_value())
             problems.add(key + ".random.correlation_length",
                          r.correlation_length ? "only for field = \"correlated\"" : "missing, field = \"correlated\" needs it");
     }
@@ -304,14 +304,14 @@ void check_wall(const Scene& scene, const WallSpec& wall, const std::string& key
     if (outside(wall.min, wall.max))
         return problems.add(key, fmt::format("wall '{}' spans ({}, {}) .. ({}, {}) m, outside the lattice", wall.name, wall.min[0],
                                              wall.min[1], wall.max[0], wall.max[1]));
-    for (std::size_t k = 0; k < 2 && wall.motion == "hand_off"; ++k)
+    for (std::size_t k = 0; k < 2 && wall.motion == WallSpec::Motion::hand_off; ++k)
         for (const double face : {wall.min[k], wall.max[k]})
             if (const double cells = (face - grid.origin[k]) / grid.cell_size; std::abs(cells - std::round(cells)) > 1e-6)
                 return problems.add(key,
                                     fmt::format("the face of wall '{}' at {} = {} m lies between lines of nodes; move it to a multiple of "
                                                 "the cell size {} m, or set motion = \"smooth\"",
                                                 wall.name, "xy"[k], face, grid.cell_size));
-    for (std::size_t k = 0; k < 2 && wall.motion == "smooth"; ++k)
+    for (std::size_t k = 0; k < 2 && wall.motion == WallSpec::Motion::smooth; ++k)
         if (const double width = wall.max[k] - wall.min[k]; width > 0 && width < 2 * grid.cell_size - slack)
             return problems.add(key,
                                 fmt::format("wall '{}' is {} m wide: a smooth wall is a plate, or at least two cells, {} m, wide, so that "
@@ -355,7 +355,7 @@ void check_traction(const Scene& scene, const TractionSpec& traction, const std:
 {
     std::vector<std::string> boxes;
     for (const BodySpec& body : scene.bodies)
-        if (body.shape == "box" && body.inside.empty())
+        if (body.shape == BodySpec::Shape::box && body.inside.empty())
             boxes.push_back(body.name);
     if (std::find(boxes.begin(), boxes.end(), traction.body) == boxes.end())
         problems.add(key + ".body", fmt::format("no box '{}'", traction.body) + suggestion(traction.body, boxes));
@@ -481,20 +481,20 @@ void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& proble
         problems.add("output.snapshots", "between 0 and 9999 is asked");
     if (!(scene.lpfdm.volume_cap == 0 || scene.lpfdm.volume_cap >= 1))
         problems.add("lpfdm.volume_cap", fmt::format("0 (no limit) or at least 1 is asked, not {}", scene.lpfdm.volume_cap));
-    else if (scene.lpfdm.volume_cap > 0 && scene.lpfdm.support != "point")
+    else if (scene.lpfdm.volume_cap > 0 && scene.lpfdm.support != LpfdmSpec::Support::point)
         problems.add("lpfdm.volume_cap", "only for support = \"point\"");
     if (scene.lpfdm.hourglass < 0 || scene.lpfdm.hourglass > 0.5)
         problems.add("lpfdm.hourglass", fmt::format("must lie in [0, 0.5], beyond that it is unstable at the critical time step; not {}",
                                                     scene.lpfdm.hourglass));
     if (scene.mpm.flip < 0 || scene.mpm.flip > 1)
         problems.add("mpm.flip", fmt::format("must lie in [0, 1], not {}", scene.mpm.flip));
-    if (scene.mpm.strain == "b_bar" && scene.mpm.shape != "linear")
+    if (scene.mpm.strain == MpmSpec::Strain::b_bar && scene.mpm.shape != MpmSpec::Shape::linear)
         problems.add("mpm.strain", "b_bar averages over a cell and needs shape = \"linear\"");
     if (scene.mpm.xpic_order < 1 || scene.mpm.xpic_order > 20)
         problems.add("mpm.xpic_order", fmt::format("must lie in [1, 20], not {}", scene.mpm.xpic_order));
-    if (scene.mpm.transfer == "xpic" && scene.mpm.flip != 1)
+    if (scene.mpm.transfer == MpmSpec::Transfer::xpic && scene.mpm.flip != 1)
         problems.add("mpm.flip", "blends FLIP with PIC; transfer = \"xpic\" has no use for it");
-    if (scene.mpm.null_space_filter != "none" && scene.mpm.shape != "linear")
+    if (scene.mpm.null_space_filter != MpmSpec::Filter::none && scene.mpm.shape != MpmSpec::Shape::linear)
         problems.add("mpm.null_space_filter", "works cell by cell and needs shape = \"linear\"; for wider shapes take transfer = \"xpic\"");
     if (!(scene.mpm.mass_cutoff >= 0 && scene.mpm.mass_cutoff <= 0.25))
         problems.add("mpm.mass_cutoff", fmt::format("must lie in [0, 0.25], not {}", scene.mpm.mass_cutoff));
@@ -507,24 +507,24 @@ void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& proble
 void check_limits(const Scene& scene, Problems& problems)
 {
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
-        if (scene.bodies[k].initial_stress && find_variant(scene.method).family == "fem")
+        if (scene.bodies[k].initial_stress && family_of(scene) == Family::fem)
             problems.warn(fmt::format("body[{}].initial_stress", k), "the FEM reference starts without stress: it is left out");
     if (scene.confinement && scene.confinement->pressure > 0)
         for (std::size_t k = 0; k < scene.bodies.size(); ++k)
             if (!scene.bodies[k].initial_stress)
                 problems.warn(fmt::format("body[{}].initial_stress", k),
                               "missing: the confining pressure hits a body without stress at once");
-    if (scene.confinement && find_variant(scene.method).family == "fem")
+    if (scene.confinement && family_of(scene) == Family::fem)
         problems.warn("confinement", "the FEM reference leaves it out, as it does the initial stress that balances it");
-    if (!scene.tractions.empty() && find_variant(scene.method).family == "lpfdm" && scene.lpfdm.support == "domain")
+    if (!scene.tractions.empty() && family_of(scene) == Family::lpfdm && scene.lpfdm.support == LpfdmSpec::Support::domain)
         problems.warn("traction",
                       "domains reach into the cells outside a loaded face, and what they hold there may run away; use [confinement] "
                       "for a pressure, or lpfdm.support = \"point\"");
-    const std::string family = find_variant(scene.method).family;
+    const Family family = family_of(scene);
     for (std::size_t k = 0; k < scene.materials.size(); ++k)
     {
         const MaterialSpec& m = scene.materials[k];
-        if (family == "fem" && m.has_strength())
+        if (family == Family::fem && m.has_strength())
             problems.warn(fmt::format("material[{}].law", k), "the FEM reference is elastic: strength is left out");
         if (m.softening && m.softening->nonlocal && scene.grid.cell_size > 0.5 * m.softening->nonlocal->internal_length)
             problems.warn(fmt::format("material[{}].softening.nonlocal", k),
@@ -534,7 +534,7 @@ void check_limits(const Scene& scene, Problems& problems)
             problems.warn(fmt::format("material[{}].softening.band_thickness", k),
                           fmt::format("crack-band scaling needs cells at least as large as the band, {} m", *m.softening->band_thickness));
     }
-    if (family == "mpm" && scene.mpm.shape == "bspline")
+    if (family == Family::mpm && scene.mpm.shape == MpmSpec::Shape::bspline)
     {
         const auto inside = [&](const Vec2& low, const Vec2& high)
         {
@@ -550,7 +550,8 @@ void check_limits(const Scene& scene, Problems& problems)
                               "quadratic B-splines are right at the edges of the lattice alone: at a wall inside it the "
                               "velocity that points see is not the wall's, and the first cells beside it are wrong");
     }
-    const bool locks = (family == "mpm" && scene.mpm.strain == "four_point") || (family == "fem" && scene.fem.degree == 1);
+    const bool locks =
+        (family == Family::mpm && scene.mpm.strain == MpmSpec::Strain::four_point) || (family == Family::fem && scene.fem.degree == 1);
     for (std::size_t k = 0; k < scene.materials.size() && locks; ++k)
         if (scene.materials[k].poissons_ratio > 0.45)
             problems.warn(fmt::format("material[{}].poissons_ratio", k),

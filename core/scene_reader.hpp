@@ -78,15 +78,25 @@ public:
             problems_.add(full(key), fmt::format("missing ({})", doc));
         optional(key, value, unit, doc);
     }
-    void choice(const char* key, std::string& value, const std::vector<std::string>& choices, const char* doc)
+    template <Choice E>
+    void choice(const char* key, E& value, const char*)
     {
-        const bool has_default = !value.empty();
-        if (has_default)
-            optional(key, value, "", doc);
+        const toml::node* node = find(key);
+        if (!node)
+            return;
+        std::string text;
+        read(full(key), *node, text);
+        if (const auto found = find_choice<E>(text))
+            value = *found;
         else
-            required(key, value, "", doc);
-        if ((has_default || find(key)) && std::find(choices.begin(), choices.end(), value) == choices.end())
-            problems_.add(full(key), fmt::format("'{}' is not a choice", value) + suggestion(value, choices));
+            problems_.add(full(key), fmt::format("'{}' is not a choice", text) + suggestion(text, names_of<E>()));
+    }
+    template <Choice E>
+    void required_choice(const char* key, E& value, const char* doc)
+    {
+        if (!find(key))
+            problems_.add(full(key), fmt::format("missing ({})", doc));
+        choice(key, value, doc);
     }
     /// An expression or a list of them. @param variables that they may depend on
     template <class T>

@@ -71,8 +71,8 @@ private:
 /// The points of the row that carries a traction.
 std::vector<Vec2> loaded_row(const TractionSpec& spec, const BodySpec& body, const GridSpec& grid, std::vector<Vec2> points)
 {
-    const std::size_t normal = spec.face == "left" || spec.face == "right" ? 0 : 1;
-    const bool low = spec.face == "left" || spec.face == "bottom";
+    const std::size_t normal = normal_of(spec.face);
+    const bool low = is_low(spec.face);
     const double h = spacing(body, grid), face = (low ? *body.min : *body.max)[normal];
     std::erase_if(points, [&](const Vec2& p) { return std::abs(p[normal] - face) > h; });
     return points;

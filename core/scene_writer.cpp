@@ -100,7 +100,16 @@ public:
     {
         optional(key, value, unit, doc);
     }
-    void choice(const char* key, std::string& value, const std::vector<std::string>&, const char* doc) { optional(key, value, "", doc); }
+    template <Choice E>
+    void choice(const char* key, E& value, const char*)
+    {
+        keys_ += fmt::format("{} = {}\n", key, in_quotes(name_of(value)));
+    }
+    template <Choice E>
+    void required_choice(const char* key, E& value, const char* doc)
+    {
+        choice(key, value, doc);
+    }
     template <class T>
     void expression(const char* key, T& value, const char*, const char* unit, const char* doc)
     {
@@ -179,9 +188,15 @@ public:
     {
         line(key, unit, doc, "required");
     }
-    void choice(const char* key, std::string& value, const std::vector<std::string>& choices, const char* doc)
+    template <Choice E>
+    void choice(const char* key, E& value, const char* doc)
     {
-        line(key, "", fmt::format("{}: {}", doc, fmt::join(choices, " | ")), value.empty() ? "required" : "default " + in_quotes(value));
+        line(key, "", fmt::format("{}: {}", doc, fmt::join(names_of<E>(), " | ")), "default " + in_quotes(name_of(value)));
+    }
+    template <Choice E>
+    void required_choice(const char* key, E&, const char* doc)
+    {
+        line(key, "", fmt::format("{}: {}", doc, fmt::join(names_of<E>(), " | ")), "required");
     }
     template <class T>
     void expression(const char* key, T&, const char* variables, const char* unit, const char* doc)
@@ -272,12 +287,12 @@ std::string variant_label(const Scene& scene)
     const auto lines = [&](Scene s)
     {
         Writer writer;
-        if (variant.family == "lpfdm")
-            s.lpfdm.describe(writer);
-        else if (variant.family == "mpm")
-            s.mpm.describe(writer);
-        else
-            s.fem.describe(writer);
+        switch (variant.family)
+        {
+        case Family::lpfdm: s.lpfdm.describe(writer); break;
+        case Family::mpm: s.mpm.describe(writer); break;
+        case Family::fem: s.fem.describe(writer); break;
+        }
         std::vector<std::string> out;
         const std::string text = writer.text();
         for (std::size_t begin = 0; begin < text.size();)

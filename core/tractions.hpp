@@ -61,8 +61,8 @@ private:
                           std::uint32_t first_id, const Constants& constants)
     {
         const BodySpec& body = scene.bodies[b];
-        const bool low = spec.face == "left" || spec.face == "bottom";
-        const std::size_t normal = spec.face == "left" || spec.face == "right" ? 0 : 1;
+        const bool low = is_low(spec.face);
+        const std::size_t normal = normal_of(spec.face);
         const double h = spacing(body, scene.grid), face = (low ? *body.min : *body.max)[normal];
         return {b, normal,   low ? -1.0 : 1.0, low ? face : face - h,     low ? face + h : face,
                 h, first_id, initial,          {spec.traction, constants}};

@@ -17,8 +17,8 @@ constexpr double slack = 1e-6;  // cells
 /// and later where the soil is stretched: the whole distance is taken.
 double reach_of(const Scene& scene)
 {
-    const std::string& family = find_variant(scene.method).family;
-    const bool mass_in_the_middle = family == "mpm" ? scene.mpm.shape == "linear" : scene.lpfdm.support == "point";
+    const bool mass_in_the_middle =
+        family_of(scene) == Family::mpm ? scene.mpm.shape == MpmSpec::Shape::linear : scene.lpfdm.support == LpfdmSpec::Support::point;
     int fewest = std::numeric_limits<int>::max();
     for (const BodySpec& body : scene.bodies)
         fewest = std::min(fewest, body.points_per_cell);
@@ -46,8 +46,8 @@ bool Wall::begin_step(double t, double dt, Restraint& restraint)
         return others;
     const Vec2 v = (*velocity_)({.t = t + 0.5 * dt});
     travel_rate_ = v;
-    restraint.components[0].velocity = spec_.fix == "y" ? 0 : v[0];
-    restraint.components[1].velocity = spec_.fix == "x" ? 0 : v[1];
+    restraint.components[0].velocity = spec_.fix == Fix::y ? 0 : v[0];
+    restraint.components[1].velocity = spec_.fix == Fix::x ? 0 : v[1];
     return others;
 }
 
@@ -63,7 +63,7 @@ Wall::Region Wall::region(double t) const
     for (std::size_t k = 0; k < 2; ++k)
     {
         double shift = travel_[k];
-        if (spec_.motion == "hand_off")
+        if (spec_.motion == WallSpec::Motion::hand_off)
             shift = lattice_.cell_size * std::trunc(shift / lattice_.cell_size + std::copysign(slack, shift));
         r.min[k] += shift;
         r.max[k] += shift;
@@ -84,7 +84,7 @@ bool Wall::is_open_at(const Region& region, const Vec2& place) const
 void Wall::take(const Region& region, Restraint& restraint)
 {
     take_nodes(region, restraint);
-    if (spec_.motion == "smooth")
+    if (spec_.motion == WallSpec::Motion::smooth)
         take_faces(region, restraint);
     taken_ = region;
 }
@@ -109,7 +109,7 @@ void Wall::take_nodes(const Region& region, Restraint& restraint)
     for (ComponentRestraint& component : restraint.components)
     {
         component.pairs.clear();
-        component.nodes = spec_.fix == (&component == &restraint.components[0] ? "y" : "x") ? std::vector<NodeIndex>{} : nodes;
+        component.nodes = fixes(spec_.fix, &component == &restraint.components[0] ? 0 : 1) ? nodes : std::vector<NodeIndex>{};
     }
 }
 
@@ -153,7 +153,7 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
     std::sort(at_faces.begin(), at_faces.end());
     for (ComponentRestraint& component : restraint.components)
     {
-        if (spec_.fix == (&component == &restraint.components[0] ? "y" : "x"))
+        if (!fixes(spec_.fix, &component == &restraint.components[0] ? 0 : 1))
             continue;
         component.pairs = pairs;
         std::erase_if(component.nodes, [&](const NodeIndex& n) { return std::binary_search(at_faces.begin(), at_faces.end(), n); });

@@ -109,12 +109,12 @@ void Elasticity::read_media()
 }
 
 template <class Holds>
-void Elasticity::add_support(const std::string& name, const std::string& fix, const WallSpec* wall, Holds&& holds, const Warn& warn)
+void Elasticity::add_support(const std::string& name, Fix fix, const WallSpec* wall, Holds&& holds, const Warn& warn)
 {
     Support support{name, wall, {}};
     bool holds_somewhere = false;
     for (std::size_t dof = 0; dof < nodes_.size(); ++dof)
-        if ((fix == "xy" || fix == (is_x(dof) ? "x" : "y")) && holds(nodes_[dof]))
+        if (fixes(fix, component_[dof]) && holds(nodes_[dof]))
         {
             holds_somewhere = true;
             for (Support& earlier : supports_)  // a node of two belongs to the later one
@@ -331,8 +331,8 @@ void Elasticity::add_tractions(double t, Vector& force) const
     for (const TractionSpec& spec : scene_.tractions)
     {
         const BodySpec& body = scene_.body(spec.body);
-        const unsigned int normal = spec.face == "left" || spec.face == "right" ? 0 : 1;
-        const double face = (spec.face == "left" || spec.face == "bottom" ? *body.min : *body.max)[normal];
+        const auto normal = static_cast<unsigned int>(normal_of(spec.face));
+        const double face = (is_low(spec.face) ? *body.min : *body.max)[normal];
         const VectorExpression traction(spec.traction, scene_.expression_constants());
         for (const auto& cell : dofs_.active_cell_iterators())
             for (const unsigned int f : cell->face_indices())

@@ -100,7 +100,7 @@ private:
     };
     void read_media();
     template <class Holds>
-    void add_support(const std::string& name, const std::string& fix, const WallSpec* wall, Holds&& holds, const Warn& warn);
+    void add_support(const std::string& name, Fix fix, const WallSpec* wall, Holds&& holds, const Warn& warn);
     void add_tractions(double t, Vector& force) const;
     void find_supports(const Warn& warn);
     void make_sparsity();

@@ -291,9 +291,10 @@ std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
     const Warn say = warn ? warn : [](const std::string& message) { fmt::print(stderr, "warning: {}\n", message); };
     const bool damped = scene.damping && scene.damping->local > 0;
     const bool ramped = scene.gravity && scene.gravity->ramp > 0;
-    const std::string& analysis = scene.fem.analysis;
     const bool moving = std::any_of(scene.walls.begin(), scene.walls.end(), [](const WallSpec& wall) { return wall.velocity.has_value(); });
-    if (analysis == "static" || (analysis == "auto" && (damped || ramped || moving || scene.time.stop_unbalanced)))
+    using Analysis = FemSpec::Analysis;
+    if (scene.fem.analysis == Analysis::statics ||
+        (scene.fem.analysis == Analysis::by_scene && (damped || ramped || moving || scene.time.stop_unbalanced)))
         return std::make_unique<StaticFem>(scene, say);
     if (moving)
         throw SceneError(fmt::format("{}: walls move only in fem.analysis = \"static\" (the state at time.end)", scene.path));
@@ -301,8 +302,11 @@ std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
         throw SceneError(fmt::format("{}: fem.analysis = \"dynamic\" has no local damping; take the damping out (--set damping.local=0), "
                                      "or set fem.analysis = \"static\" for the state at rest",
                                      scene.path));
-    if (scene.fem.integrator == "central_difference")
-        return std::make_unique<CentralDifferenceFem>(scene, say);
-    return std::make_unique<NewmarkFem>(scene, say);
+    switch (scene.fem.integrator)
+    {
+    case FemSpec::Integrator::central_difference: return std::make_unique<CentralDifferenceFem>(scene, say);
+    case FemSpec::Integrator::newmark: return std::make_unique<NewmarkFem>(scene, say);
+    }
+    throw std::logic_error("not an integrator");
 }
 }  // namespace testbed

@@ -32,7 +32,7 @@ void check_box_on_lattice(const Scene& scene, const BodySpec& body, const Lattic
 /// Area of a polygon by its corners, pi R^2 of a disk [m^2].
 double area(const BodySpec& body)
 {
-    if (body.shape == "disk")
+    if (body.shape == BodySpec::Shape::disk)
         return std::numbers::pi * *body.radius * *body.radius;
     double twice = 0;
     const auto& v = body.vertices;
@@ -67,7 +67,7 @@ std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice& l
     for (unsigned int b = 0; b < scene.bodies.size(); ++b)
     {
         const BodySpec& body = scene.bodies[b];
-        if (body.shape == "box")
+        if (body.shape == BodySpec::Shape::box)
             check_box_on_lattice(scene, body, lattice);
         const std::vector<Cell> cells = covered_cells(coarse, coarse.bodies[b], lattice);
         for (const Cell& cell : cells)
@@ -77,7 +77,7 @@ std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice& l
                                              scene.path, body.name, scene.bodies[at->second].name,
                                              lattice.origin[0] + cell.second * lattice.cell_size,
                                              lattice.origin[1] + cell.first * lattice.cell_size));
-        if (body.shape != "box")
+        if (body.shape != BodySpec::Shape::box)
             warn(fmt::format("body '{}': the FEM mesh is made of whole lattice cells, so its boundary is stepped and its area is "
                              "{:.4g} m^2 instead of {:.4g} m^2",
                              body.name, static_cast<double>(cells.size()) * lattice.cell_size * lattice.cell_size, area(body)));
@@ -89,7 +89,8 @@ std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice& l
 Lattice mesh_lattice(const Scene& scene)
 {
     const Lattice lattice = make_lattice(scene.grid);
-    const auto box = std::find_if(scene.bodies.begin(), scene.bodies.end(), [](const BodySpec& body) { return body.shape == "box"; });
+    const auto box =
+        std::find_if(scene.bodies.begin(), scene.bodies.end(), [](const BodySpec& body) { return body.shape == BodySpec::Shape::box; });
     if (box == scene.bodies.end())
         return lattice;
     Vec2 origin = lattice.origin;

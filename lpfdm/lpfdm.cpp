@@ -25,9 +25,9 @@ public:
           node_ops_(scene, make_lattice(scene.grid)),
           mass_before_(grid_.lattice.nodes(), 0),
           options_(scene.lpfdm),
-          increment_{scene.lpfdm.convection == "two_sided" ? 0.5 : 0.0}
+          increment_{scene.lpfdm.convection == LpfdmSpec::Convection::two_sided ? 0.5 : 0.0}
     {
-        if (options_.convection == "two_sided")
+        if (options_.convection == LpfdmSpec::Convection::two_sided)
             faces_.emplace(grid_.lattice.nodes());
         if (scene.body_force)
             body_force_.emplace(*scene.body_force, scene.expression_constants());
@@ -329,7 +329,7 @@ private:
         std::vector<std::pair<std::uint32_t, Vec2>> reached;
         for (const auto n : nodes_.active())
             if (nodes_.mass[n] > 0 && !mass_before_[n])
-                reached.emplace_back(n, started_ && options_.frontier != "literal" ? mean_of_neighbours(n) : Vec2{0, 0});
+                reached.emplace_back(n, started_ && options_.frontier != LpfdmSpec::Frontier::literal ? mean_of_neighbours(n) : Vec2{0, 0});
         for (const auto& [n, v] : reached)
             if (started_)
             {
@@ -402,19 +402,19 @@ private:
     /// Eq. (13).
     void convect_velocity(double dt)
     {
-        if (options_.convection == "none" || !started_)
+        if (options_.convection == LpfdmSpec::Convection::none || !started_)
             return;
         if (gradients_over_ != dt)
             cell_gradients(grid_, dt);
-        if (faces_)
+        switch (options_.convection)
         {
+        case LpfdmSpec::Convection::none: return;
+        case LpfdmSpec::Convection::upwind: return convect<UpwindConvection>(grid_, dt);
+        case LpfdmSpec::Convection::central: return convect<CentralConvection>(grid_, dt);
+        case LpfdmSpec::Convection::two_sided:
             faces_->find(grid_);
-            convect(grid_, *faces_, dt, 0.5, options_.frontier == "arrival" ? &mass_before_ : nullptr);
+            return convect(grid_, *faces_, dt, 0.5, options_.frontier == LpfdmSpec::Frontier::arrival ? &mass_before_ : nullptr);
         }
-        else if (options_.convection == "upwind")
-            convect<UpwindConvection>(grid_, dt);
-        else
-            convect<CentralConvection>(grid_, dt);
     }
 
     void add_body_force(double t)
@@ -491,8 +491,11 @@ private:
 
 std::unique_ptr<Solver> make_lpfdm(const Scene& scene)
 {
-    if (scene.lpfdm.support == "point")
-        return std::make_unique<Lpfdm<PointSupport>>(scene);
-    return std::make_unique<Lpfdm<DomainSupport>>(scene);
+    switch (scene.lpfdm.support)
+    {
+    case LpfdmSpec::Support::point: return std::make_unique<Lpfdm<PointSupport>>(scene);
+    case LpfdmSpec::Support::domain: return std::make_unique<Lpfdm<DomainSupport>>(scene);
+    }
+    throw std::logic_error("not a support");
 }
 }  // namespace testbed

@@ -32,10 +32,10 @@ public:
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
           options_(scene.mpm),
-          increment_(strain_increment(scene.mpm.increment)),
+          increment_{scene.mpm.increment == MpmSpec::Increment::midpoint ? 0.5 : 0.0},
           least_mass_(options_.mass_cutoff * mass_of_a_full_node())
     {
-        if (options_.transfer == "xpic")
+        if (options_.transfer == MpmSpec::Transfer::xpic)
             xpic_.emplace(options_.xpic_order);
         if (scene.body_force)
             body_force_.emplace(*scene.body_force, scene.expression_constants());
@@ -63,7 +63,7 @@ public:
         if (nonlocal_)
             timer_("nonlocal strain", [&]
                    { nonlocal_->template apply<Shape>(lattice_, bodies_, gather_, [&](int i, int j) { return lattice_.node(i, j); }); });
-        if (options_.scheme == "usf")
+        if (options_.scheme == MpmSpec::Scheme::usf)
         {
             timer_("points to nodes",
                    [&]
@@ -108,14 +108,15 @@ public:
         const double dt = step.dt;
         if (xpic_)
             timer_("xpic", [&] { filter_velocity(); });
-        if (options_.null_space_filter == "cell")
+        if (options_.null_space_filter == MpmSpec::Filter::cell)
             timer_("null-space filter", [&] { filter_points(); });
         timer_("acceleration", [&] { accelerate_and_keep_increment(step.kick()); });
         started_ = true;
-        const bool remap = options_.scheme == "musl";
+        const bool remap = options_.scheme == MpmSpec::Scheme::musl;
         timer_("nodes to points", [&] { update_velocity(remap); });
-        if (remap)
+        switch (options_.scheme)
         {
+        case MpmSpec::Scheme::musl:
             timer_("remap velocity",
                    [&]
                    {
@@ -125,11 +126,10 @@ public:
                        extend(nodes_.vx, nodes_.vy);
                    });
             timer_("points, material", [&] { move_points<true>(carrier_x_, carrier_y_, dt); });
+            break;
+        case MpmSpec::Scheme::usl: timer_("points, material", [&] { move_points<true>(nodes_.vx, nodes_.vy, dt); }); break;
+        case MpmSpec::Scheme::usf: timer_("points", [&] { move_points<false>(nodes_.vx, nodes_.vy, dt); }); break;
         }
-        else if (options_.scheme == "usl")
-            timer_("points, material", [&] { move_points<true>(nodes_.vx, nodes_.vy, dt); });
-        else
-            timer_("points", [&] { move_points<false>(nodes_.vx, nodes_.vy, dt); });
         if (xpic_)
             timer_("xpic", [&] { move_by_filter(dt); });
         node_ops_.end_step(dt);
@@ -151,7 +151,7 @@ public:
     std::optional<NodalWork> work() const override
     {
         NodalWork work = node_ops_.work(nodes_, lag_);
-        work.of_strain = options_.scheme != "musl" && !xpic_;
+        work.of_strain = options_.scheme != MpmSpec::Scheme::musl && !xpic_;
         return work;
     }
     std::pair<const Lattice*, const Nodes*> nodes() const override { return {&lattice_, &nodes_}; }
@@ -187,7 +187,7 @@ public:
     /// Without the filters of the velocity, which are not in this system.
     std::optional<double> sharp_step_limit() override
     {
-        if (xpic_ || options_.null_space_filter != "none")
+        if (xpic_ || options_.null_space_filter != MpmSpec::Filter::none)
             return std::nullopt;
         ElementSystem elements = mpm_elements<Shape, Strain>(lattice_, bodies_);
         fix(elements, node_ops_.restraints(), lattice_);
@@ -225,7 +225,7 @@ private:
             moved_ |= body.bins.has_marks();
         }
         find_nodes(bins);
-        if (options_.scheme != "usf")
+        if (options_.scheme != MpmSpec::Scheme::usf)
             sums_.update(lattice_, bodies_);
     }
 
@@ -244,7 +244,7 @@ private:
                 renumber(lattice);
             find_nodes(bins);
         }
-        if (options_.scheme != "usf")
+        if (options_.scheme != MpmSpec::Scheme::usf)
             other_bins ? sums_.update(lattice_, bodies_) : sums_.update_changed(lattice_, bodies_);
         moved_ = false;
     }
@@ -254,7 +254,7 @@ private:
     {
         weight_->nodes.assign(nodes_.mass.size(), 0.0);
         const auto take = [&](std::size_t n, double mass) { weight_->nodes[n] = mass; };
-        if (options_.scheme == "usf")
+        if (options_.scheme == MpmSpec::Scheme::usf)
         {
             points_to_nodes<Scatter::momentum>();  // once more: the workspace holds forces now
             restrain_mapped_velocity();
@@ -564,7 +564,7 @@ private:
     /// What XPIC took from the velocity of the points moves them, too.
     void move_by_filter(double dt)
     {
-        const bool sum = options_.scheme != "usf";
+        const bool sum = options_.scheme != MpmSpec::Scheme::usf;
         std::atomic<bool> moved{moved_};
         for_each_bin(
             [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
@@ -679,12 +679,15 @@ private:
 
 std::unique_ptr<Solver> make_mpm(const Scene& scene)
 {
-    if (scene.mpm.shape == "cpgimp")
-        return std::make_unique<Mpm<GimpShape, PointStrain>>(scene);
-    if (scene.mpm.shape == "bspline")
-        return std::make_unique<Mpm<BSplineShape, PointStrain>>(scene);
-    if (scene.mpm.strain == "b_bar")
-        return std::make_unique<Mpm<LinearShape, BBarStrain>>(scene);
-    return std::make_unique<Mpm<LinearShape, PointStrain>>(scene);
+    switch (scene.mpm.shape)
+    {
+    case MpmSpec::Shape::cpgimp: return std::make_unique<Mpm<GimpShape, PointStrain>>(scene);
+    case MpmSpec::Shape::bspline: return std::make_unique<Mpm<BSplineShape, PointStrain>>(scene);
+    case MpmSpec::Shape::linear:
+        if (scene.mpm.strain == MpmSpec::Strain::b_bar)
+            return std::make_unique<Mpm<LinearShape, BBarStrain>>(scene);
+        return std::make_unique<Mpm<LinearShape, PointStrain>>(scene);
+    }
+    throw std::logic_error("not a shape");
 }
 }  // namespace testbed

@@ -98,7 +98,7 @@ std::vector<StepLimit> mpm_step_limits(const Lattice& lattice, const std::vector
 {
     const double factor = damping_factor(alpha) * std::sqrt(0.5 * (1 + options.flip));
     std::vector<StepLimit> limits;
-    if (options.scheme == "usl")
+    if (options.scheme == MpmSpec::Scheme::usl)
         limits.push_back({"cell content", content_limit<Shape>(lattice, bodies) * factor});
     else
     {
@@ -107,7 +107,7 @@ std::vector<StepLimit> mpm_step_limits(const Lattice& lattice, const std::vector
         const double on_nodes = sparse && std::is_same_v<Shape, LinearShape> ? std::sqrt(0.5) : 1.0;
         const double isolated = isolated_cell_limit(bodies, lattice.cell_size) * factor;
         limits.push_back({"stiffness", isolated * on_nodes});
-        if (std::is_same_v<Shape, LinearShape> && options.transfer != "xpic")
+        if (std::is_same_v<Shape, LinearShape> && options.transfer != MpmSpec::Transfer::xpic)
             limits.push_back({"crossing", isolated * crossing_share});
     }
     double speed = 0;
@@ -214,7 +214,7 @@ double mpm_sharp_limit(const ElementSystem& system, const MpmSpec& options, doub
                 h[i] += 2 / (3 + f) * (smoothed[i] - (1 + f) * h[i] - (1 - f) * rest[i]);
         }
     };
-    const bool last = options.scheme == "usl";
+    const bool last = options.scheme == MpmSpec::Scheme::usl;
     const double largest = largest_eigenvalue(
         system, [&](const auto& in, auto& out) { system.apply_stiffness(in, out); },
         [&](std::vector<double>& v)

@@ -14,7 +14,7 @@ namespace
 {
 std::unique_ptr<Solver> make(const Scene& scene)
 {
-    return find_variant(scene.method).family == "mpm" ? make_mpm(scene) : make_lpfdm(scene);
+    return family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene);
 }
 
 void step(Solver& solver, int n, double dt)
@@ -29,7 +29,7 @@ struct StateCase
     const char* method;
     std::vector<std::string> overrides;
 };
-std::string name_of(const testing::TestParamInfo<StateCase>& info)
+std::string label_of(const testing::TestParamInfo<StateCase>& info)
 {
     return info.param.name;
 }
@@ -165,4 +165,4 @@ INSTANTIATE_TEST_SUITE_P(Variants, StateOf,
                                          StateCase{"mpm_bspline", "mpm-bspline", {}}, StateCase{"mpm_cpgimp", "mpm-cpgimp", {}},
                                          StateCase{"mpm_usf", "mpm-linear", {"mpm.scheme=usf"}},
                                          StateCase{"mpm_usl_pic", "mpm-cpgimp", {"mpm.scheme=usl", "mpm.flip=0.9"}}),
-                         name_of);
+                         label_of);

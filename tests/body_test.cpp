@@ -10,7 +10,7 @@ using namespace testbed;
 TEST(Fill, BoxStartsAtItsOwnCorner)
 {
     BodySpec box;
-    box.shape = "box";
+    box.shape = BodySpec::Shape::box;
     box.points_per_cell = 2;
     box.min = Vec2{0.3, 0.1};
     box.max = Vec2{1.3, 0.6};
@@ -28,13 +28,13 @@ TEST(Fill, DiskAndPolygonAreas)
     Scene scene;
     scene.grid = {{-2, -2}, {4, 4}, 0.1};
     BodySpec disk;
-    disk.shape = "disk";
+    disk.shape = BodySpec::Shape::disk;
     disk.center = Vec2{0.2, -0.1};
     disk.radius = 1.3;
     const double share = 0.025 * 0.025;
     EXPECT_NEAR(static_cast<double>(fill(scene, disk).size()) * share, 3.14159 * 1.69, 0.01);
     BodySpec triangle;
-    triangle.shape = "polygon";
+    triangle.shape = BodySpec::Shape::polygon;
     triangle.vertices = {{-1, -1}, {1, -1}, {-1, 1}};
     EXPECT_NEAR(static_cast<double>(fill(scene, triangle).size()) * share, 2.0, 0.05);
 }

@@ -86,7 +86,7 @@ struct Watched
 Watched watch(const std::string& text, const std::string& method, const std::vector<std::string>& overrides = {}, int every = 5)
 {
     Watched w{test::load(text, method, overrides)};
-    w.solver = find_variant(method).family == "mpm" ? make_mpm(w.scene) : make_lpfdm(w.scene);
+    w.solver = find_variant(method).family == Family::mpm ? make_mpm(w.scene) : make_lpfdm(w.scene);
     Observer observer(w.scene, *w.solver);
     const double dt = time_step(w.scene, *w.solver), critical = w.solver->critical_time_step(w.scene);
     Guards guards(w.scene, *w.solver, critical);

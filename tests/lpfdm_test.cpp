@@ -151,7 +151,7 @@ TEST(Forces, PatchOfShiftedPoints)
                         {largest, std::abs(grid.nodes.fx[grid.lattice.node(i, j)]), std::abs(grid.nodes.fy[grid.lattice.node(i, j)])});
             return largest;
         };
-        return scene.lpfdm.support == "point" ? measure(PointSupport{}) : measure(DomainSupport{});
+        return scene.lpfdm.support == LpfdmSpec::Support::point ? measure(PointSupport{}) : measure(DomainSupport{});
     };
     EXPECT_LT(inner_force("lpfdm", 0.0), 1e-12);
     EXPECT_LT(inner_force("lpfdm", 0.13), 1e-12);
@@ -176,8 +176,12 @@ TEST_P(LpfdmOracle, SameTrajectories)
     const LpfdmCase& c = GetParam();
     const Scene scene = test::load(with_gravity(), c.method, c.overrides);
     const auto solver = make_lpfdm(scene);
-    test::RefLpfdm reference{{0.5, -1, -1}, test::reference_points(scene),         c.domain,
-                             c.central,     scene.lpfdm.convection == "two_sided", scene.lpfdm.frontier == "arrival"};
+    test::RefLpfdm reference{{0.5, -1, -1},
+                             test::reference_points(scene),
+                             c.domain,
+                             c.central,
+                             scene.lpfdm.convection == LpfdmSpec::Convection::two_sided,
+                             scene.lpfdm.frontier == LpfdmSpec::Frontier::arrival};
     // hourglass: the scene's coefficient times the fastest wave over L
     double wave_speed = 0;
     for (const Body& body : solver->bodies())

@@ -39,7 +39,7 @@ struct Case
 
     Case(const std::string& text, const std::string& method, const std::vector<std::string>& overrides = {}, int steps = 1)
         : scene(test::load(text, method, overrides)),
-          solver(find_variant(scene.method).family == "mpm" ? make_mpm(scene) : make_lpfdm(scene)),
+          solver(family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene)),
           dt(scene.time.dt.value_or(scene.time.cfl / wave_speed))
     {
         for (int n = 0; n < steps; ++n, t += dt)

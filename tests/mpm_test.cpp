@@ -226,11 +226,11 @@ TEST_P(MpmOracle, SameTrajectories)
     const auto solver = make_mpm(scene);
     test::RefMpm reference{{0.5, -1, -1},
                            test::reference_points(scene),
-                           scene.mpm.shape,
+                           name_of(scene.mpm.shape),
                            c.scheme,
                            c.flip,
-                           scene.mpm.strain == "b_bar",
-                           scene.mpm.increment == "midpoint"};
+                           scene.mpm.strain == MpmSpec::Strain::b_bar,
+                           scene.mpm.increment == MpmSpec::Increment::midpoint};
     reference.least = scene.mpm.mass_cutoff * 1000 * 0.25;  // of the lighter body
     for (int n = 0; n < 40; ++n)
     {

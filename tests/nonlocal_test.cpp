@@ -83,6 +83,7 @@ TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
     nonlocal.apply<PointSupport>(lattice, bodies, gather, index);
     EXPECT_EQ(bodies[0].points.softening_strain[700], 0);
     EXPECT_GT(bodies[0].points.softening_strain[704], 0);
-    EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = "gauss"}, 2), std::exp(-1.0));
-    EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = "galavi_schweiger"}, 1), 0.5 * std::exp(-0.25));
+    EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::gauss}, 2), std::exp(-1.0));
+    EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::galavi_schweiger}, 1),
+              0.5 * std::exp(-0.25));
 }

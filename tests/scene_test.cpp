@@ -60,7 +60,7 @@ TEST(Scene, ReadsConstantsAndExpressions)
     EXPECT_DOUBLE_EQ(scene.grid.size[1], 4);
     EXPECT_DOUBLE_EQ((*scene.bodies[0].max)[1], 2);
     EXPECT_EQ(scene.method, "lpfdm");
-    EXPECT_EQ(scene.lpfdm.support, "domain");
+    EXPECT_EQ(scene.lpfdm.support, LpfdmSpec::Support::domain);
     EXPECT_FALSE(scene.gravity || scene.damping || scene.body_force);
 }
 
@@ -82,8 +82,8 @@ TEST(Scene, OverridesReplaceAnyKey)
     EXPECT_DOUBLE_EQ(scene.materials[0].density, 5);
     EXPECT_DOUBLE_EQ(scene.gravity->acceleration[1], -1);
     EXPECT_DOUBLE_EQ(scene.grid.size[1], 6);
-    EXPECT_EQ(scene.mpm.shape, "cpgimp");
-    EXPECT_EQ(scene.lpfdm.support, "point");
+    EXPECT_EQ(scene.mpm.shape, MpmSpec::Shape::cpgimp);
+    EXPECT_EQ(scene.lpfdm.support, LpfdmSpec::Support::point);
 }
 
 /// The resolved scene says everything and means the same.

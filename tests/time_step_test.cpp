@@ -17,7 +17,7 @@ namespace
 {
 std::unique_ptr<Solver> make(const Scene& scene)
 {
-    return find_variant(scene.method).family == "mpm" ? make_mpm(scene) : make_lpfdm(scene);
+    return family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene);
 }
 
 /// Elastic cells with c_p = 1 m/s on a lattice with L = 1 m, at rest but for a velocity far too small to move or turn anything.
