@@ -437,6 +437,7 @@ TEST(Guards, MomentumHourglassGravityDrift)
     { return [drift](GuardSample& s, int k) { s.points.moment[1] = -1000 * (0.1 * (1 - std::cos(0.5 * k)) + 0.1 * drift * k / 2000); }; };
     EXPECT_EQ(codes(floor_y + gravity, swing(0.008), 2000), "");
     EXPECT_EQ(codes(floor_y + gravity, swing(0.02), 2000), "drift");
+    EXPECT_EQ(codes(floor_y + gravity, swing(-0.02), 2000), "drift");
     EXPECT_EQ(codes(floor_y + gravity + "[damping]\nlocal = 0.1\n", swing(0.02), 2000), "");
     // of the highest points alone
     const auto nod = [](double drift)
@@ -450,6 +451,39 @@ TEST(Guards, MomentumHourglassGravityDrift)
     };
     EXPECT_EQ(codes(floor_y + gravity, nod(0.008), 2000), "");
     EXPECT_EQ(codes(floor_y + gravity, nod(0.02), 2000), "drift");
+}
+
+/// What the guards and the history sum over the points.
+TEST(PointSums, OfASqueezedAndShearedBody)
+{
+    const Scene scene = test::load(block(""), "lpfdm");
+    const Lattice lattice = make_lattice(scene.grid);
+    auto bodies = make_bodies(scene, lattice, {.box = true});
+    Points& q = bodies[0].points;
+    const double E = 1e5, nu = 0.3, shear = E / (2 * (1 + nu)), initial = static_cast<double>(q.count) * q.initial_volume;
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        q.half_y[p] *= 0.5;
+        q.sxx[p] = 300;
+        q.syy[p] = -200;
+        q.sxy[p] = -700;
+    }
+    const PointSums sums = point_sums(bodies, lattice);
+    EXPECT_NEAR(sums.volume, 0.5 * initial, 1e-9);
+    EXPECT_NEAR(sums.smallest, 0.5, 1e-12);
+    EXPECT_NEAR(sums.largest, 0.5, 1e-12);
+    EXPECT_EQ(sums.max_stress, 700);
+    const double exx = (300 - nu * (-200 + nu * 100)) / E, eyy = (-200 - nu * (300 + nu * 100)) / E;
+    EXPECT_NEAR(sums.strain_energy, 0.5 * initial * (0.5 * (300 * exx - 200 * eyy) + 0.5 * 700 * 700 / shear), 1e-9 * initial);
+}
+
+/// The work of gravity that grows: the record, coarse as it may be, agrees with the nodes, which see each step.
+TEST(Observer, WorkOfGravityOverARamp)
+{
+    const std::string ramp = "[gravity]\nacceleration = [0.0, -1.0]\nramp = 0.5\nprofile = \"linear\"\n";
+    const Watched w = watch(block(floor_y + ramp, 0.0, 0.5), "lpfdm", {}, 8);
+    ASSERT_LT(w.samples.size(), 10u);
+    EXPECT_NEAR(w.samples.back().gravity_work / w.end().gravity, 1, 0.02);
 }
 
 /// A block that bulges under its weight on a rough floor, nearly incompressible: a strain at each point locks, one in each cell does not.

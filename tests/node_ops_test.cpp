@@ -33,6 +33,26 @@ TEST(Gravity, RampsSmoothly)
     EXPECT_DOUBLE_EQ(nodes.fy[1], 0);  // not in use
 }
 
+/// Loading to failure: in proportion to time.
+TEST(Gravity, RampsLinearlyWhereTheSceneSaysSo)
+{
+    GravitySpec spec{.acceleration = {0, -9.81}, .ramp = 2.0};
+    EXPECT_NEAR(make_gravity(spec).factor(0.5), 0.5 * (1 - std::sqrt(0.5)), 1e-12);
+    spec.profile = GravitySpec::Profile::linear;
+    for (const double t : {0.0, 0.3, 0.5, 1.7})
+        EXPECT_DOUBLE_EQ(make_gravity(spec).factor(t), t / 2);
+    EXPECT_DOUBLE_EQ(make_gravity(spec).factor(3), 1);
+}
+
+/// Each component by its own acceleration.
+TEST(Gravity, PullsBothWays)
+{
+    Nodes nodes = two_nodes();
+    (Gravity{{2, -3}, 0}).apply(nodes, 1);
+    EXPECT_DOUBLE_EQ(nodes.fx[2], 12 + 4 * 2);
+    EXPECT_DOUBLE_EQ(nodes.fy[2], -4 * 3);
+}
+
 /// Eq. (15): opposes the motion, whatever the sign of the force; nothing at rest.
 TEST(LocalDamping, AlwaysOpposesTheMotion)
 {
@@ -43,6 +63,18 @@ TEST(LocalDamping, AlwaysOpposesTheMotion)
     EXPECT_DOUBLE_EQ(damping.damped(Pack(10.0), Pack(0.0))[0], 10);
 }
 
+/// What was taken is known from what is left.
+TEST(LocalDamping, KnowsWhatItTook)
+{
+    const LocalDamping damping{0.8};
+    for (const double force : {10.0, -3.0})
+        for (const double velocity : {2.0, -2.0, 0.0})
+        {
+            const Pack left = damping.damped(Pack(force), Pack(velocity));
+            EXPECT_NEAR(damping.taken(left, Pack(velocity))[0], force - left[0], 1e-12) << force << " " << velocity;
+        }
+}
+
 TEST(Accelerate, ByForceOverMass)
 {
     Nodes nodes = two_nodes();
@@ -51,6 +83,38 @@ TEST(Accelerate, ByForceOverMass)
     EXPECT_DOUBLE_EQ(nodes.vx[0], 1.5);
     EXPECT_DOUBLE_EQ(nodes.vx[1], 7);
     EXPECT_DOUBLE_EQ(nodes.vx[2], -1);  // no mass, no acceleration
+}
+
+/// The work of a kick is the change of the kinetic energy; mass times way and what damping took go with the velocity in its middle.
+TEST(Accelerate, KnowsItsWork)
+{
+    Nodes nodes = two_nodes();
+    nodes.fy = {4, 0, -6};
+    nodes.vy = {-3, 0, 2};
+    const auto kinetic = [&]
+    {
+        double sum = 0;
+        for (const std::size_t n : {0, 2})
+            sum += 0.5 * nodes.mass[n] * (nodes.vx[n] * nodes.vx[n] + nodes.vy[n] * nodes.vy[n]);
+        return sum;
+    };
+    const LocalDamping damping{0.5};
+    const Nodes before = nodes;
+    const double energy = kinetic();
+    const Kick kick = accelerate(nodes, nodes.mass, 0.1, damping);
+    EXPECT_NEAR(kick.work, kinetic() - energy, 1e-12);
+    Vec2 transport{0, 0};
+    double damped = 0;
+    for (const std::size_t n : {0, 2})
+    {
+        const double x = 0.5 * (before.vx[n] + nodes.vx[n]), y = 0.5 * (before.vy[n] + nodes.vy[n]);
+        transport = {transport[0] + 0.1 * nodes.mass[n] * x, transport[1] + 0.1 * nodes.mass[n] * y};
+        damped += 0.1 * (damping.taken(Pack(before.fx[n]), Pack(before.vx[n]))[0] * x +
+                         damping.taken(Pack(before.fy[n]), Pack(before.vy[n]))[0] * y);
+    }
+    EXPECT_NEAR(kick.transport[0], transport[0], 1e-12);
+    EXPECT_NEAR(kick.transport[1], transport[1], 1e-12);
+    EXPECT_NEAR(kick.damping, damped, 1e-12);
 }
 
 TEST(NodalSums, EnergyAndMomenta)

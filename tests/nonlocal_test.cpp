@@ -83,6 +83,10 @@ TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
     nonlocal.apply<PointSupport>(lattice, bodies, gather, index);
     EXPECT_EQ(bodies[0].points.softening_strain[700], 0);
     EXPECT_GT(bodies[0].points.softening_strain[704], 0);
+    const Points& q = bodies[0].points;
+    for (std::size_t p = 0; p < q.count; ++p)  // the weight reaches three internal lengths
+        if (const double r = std::hypot(q.x[p] - q.x[700], q.y[p] - q.y[700]); r > 0.3)
+            EXPECT_TRUE(r > 1.1 || q.softening_strain[p] > 0) << r;
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::gauss}, 2), std::exp(-1.0));
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::galavi_schweiger}, 1),
               0.5 * std::exp(-0.25));

@@ -35,20 +35,21 @@ TEST(StandardNormal, MomentsAndIndependence)
 TEST(CorrelatedField, VarianceAndCorrelation)
 {
     const double theta = 0.7;
-    const int seeds = 4000;
-    for (const double r : {0.2, 0.5, 1.0})
+    const int seeds = 40000;
+    const std::array<double, 3> distance{0.2, 0.5, 1.0};
+    double variance = 0;
+    std::array<double, 3> covariance{};
+    for (int seed = 0; seed < seeds; ++seed)
     {
-        double variance = 0, covariance = 0;
-        for (int seed = 0; seed < seeds; ++seed)
-        {
-            const CorrelatedField field(static_cast<std::uint64_t>(seed), 0, theta);
-            const double a = field({0.13, -0.4}), b = field({0.13 + 0.6 * r, -0.4 + 0.8 * r});
-            variance += a * a / seeds;
-            covariance += a * b / seeds;
-        }
-        EXPECT_NEAR(variance, 1, 0.09);  // 4 standard errors
-        EXPECT_NEAR(covariance, std::exp(-r * r / (theta * theta)), 0.09);
+        const CorrelatedField field(static_cast<std::uint64_t>(seed), 0, theta);
+        const double a = field({0.13, -0.4});
+        variance += a * a / seeds;
+        for (std::size_t k = 0; k < 3; ++k)
+            covariance[k] += a * field({0.13 + 0.6 * distance[k], -0.4 + 0.8 * distance[k]}) / seeds;
     }
+    EXPECT_NEAR(variance, 1, 0.028);  // 4 standard errors
+    for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(covariance[k], std::exp(-distance[k] * distance[k] / (theta * theta)), 0.028) << distance[k];
 }
 
 namespace
@@ -68,7 +69,7 @@ TEST(RandomStrength, MeanDeviationAndTruncation)
     const Scene scene = test::load(with(random_table), "", {"body.soil.points_per_cell=16", "material.soil.random.cohesion_deviation=0.8"});
     const auto bodies = make_bodies(scene, make_lattice(scene.grid), {});
     const Points& q = bodies[0].points;
-    double c = 0, phi = 0, square = 0, zero = 0;
+    double c = 0, phi = 0, square = 0, zero = 0, together = 0;
     for (std::size_t p = 0; p < q.count; ++p)
     {
         EXPECT_GE(q.cohesion[p], 0);
@@ -77,11 +78,14 @@ TEST(RandomStrength, MeanDeviationAndTruncation)
         phi += angle / static_cast<double>(q.count);
         square += (angle - 0.5) * (angle - 0.5) / static_cast<double>(q.count);
         zero += q.cohesion[p] == 0;
+        together += (q.cohesion[p] - 9800) * (angle - 0.5) / (0.8 * 9800 * 0.125) / static_cast<double>(q.count);
     }
     EXPECT_NEAR(phi, 0.5, 0.005);
     EXPECT_NEAR(std::sqrt(square), 0.125, 0.003);
-    EXPECT_NEAR(zero / static_cast<double>(q.count), 0.1056, 0.01);  // P(z < -1/0.8)
-    EXPECT_NEAR(bodies[0].truncated_share, 0.5 * 0.1056, 0.006);     // of both parameters
+    EXPECT_NEAR(together, 0, 4 / std::sqrt(static_cast<double>(q.count)));  // two fields, not one
+    EXPECT_NEAR(c / 9800, 1.0328, 0.02);                                    // of max(0, 1 + 0.8 z)
+    EXPECT_NEAR(zero / static_cast<double>(q.count), 0.1056, 0.01);         // P(z < -1/0.8)
+    EXPECT_NEAR(bodies[0].truncated_share, 0.5 * 0.1056, 0.006);            // of both parameters
 }
 
 TEST(RandomStrength, CorrelatedFieldIsTheSameForEveryCellSize)

@@ -89,3 +89,40 @@ TEST(Tractions, FollowTheSurface)
         EXPECT_NEAR(s.off, 0, 1e-6);
     }
 }
+
+/// The surface is half of the point's own box away, in the direction of the face alone, however the box was stretched.
+TEST(Tractions, ActOnTheEdgeOfAStretchedBox)
+{
+    struct Face
+    {
+        const char* name;
+        std::size_t normal;
+        double at;
+    };
+    for (const Face& face : {Face{"left", 0, 1}, {"right", 0, 3}, {"bottom", 1, 1}, {"top", 1, 3}})
+    {
+        SCOPED_TRACE(face.name);
+        const Scene scene = loaded(face.name, "[\"7\", \"7\"]");
+        const Lattice lattice = make_lattice(scene.grid);
+        auto bodies = make_bodies(scene, lattice, {.box = true});
+        Points& q = bodies[0].points;
+        const double h = 1.0 / 6;
+        for (std::size_t p = 0; p < q.count; ++p)
+        {
+            q.half_x[p] *= 1.2;
+            q.half_y[p] *= 0.7;
+        }
+        Nodes nodes(lattice.nodes());
+        std::fill(nodes.mass.begin(), nodes.mass.end(), 1.0);
+        Tractions(scene).apply(lattice, bodies, nodes, 0);
+        double force = 0, moment = 0;
+        for (std::size_t n = 0; n < lattice.nodes(); ++n)
+        {
+            force += nodes.fx[n];
+            moment += lattice.node_position(n)[face.normal] * nodes.fx[n];
+        }
+        const double outward = face.at > 2 ? 1 : -1, moved = 0.5 * h * ((face.normal == 0 ? 1.2 : 0.7) - 1);
+        EXPECT_NEAR(force, 14, 1e-9);
+        EXPECT_NEAR(moment / force, face.at + outward * moved, 1e-9);
+    }
+}

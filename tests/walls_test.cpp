@@ -140,9 +140,9 @@ TEST(Wall, HandsOffAtExactlyOneCell)
     {
         const std::string v = std::to_string(direction);
         Fixture f("[[wall]]\nname = \"w\"\nmin = [0.0, 2.0]\nmax = [4.0, 2.0]\nvelocity = [\"0\", \"" + v + "*(t<0.5)\"]\n");
-        for (int n = 0; n < 5; ++n)
+        for (int n = 0; n < 10; ++n)
         {
-            f.step(0.1 * n, 0.1);  // 0.5 m in all: one cell
+            f.step(0.05 * n, 0.05);  // 0.5 m in all: one cell
             EXPECT_EQ(f.column(3)[4], direction);
         }
         f.ops.begin_step(0.5, 0.1);
