@@ -288,6 +288,25 @@ TEST(FemStatic, AWallPrescribesItsDisplacement)
     EXPECT_NEAR((*records[2].displacement)[1], travel, 1e-9);
 }
 
+/// An open door holds nothing, a closed one all that is in it.
+TEST(FemStatic, ADoorHoldsNothingOnceOpen)
+{
+    for (const double opens : {0.5, 2.0})  // the scene ends at 1 s
+    {
+        const Scene scene =
+            scene_of(soil + box("block", 0, 0, 6, H) + gravity + "[[wall]]\nname = \"floor\"\nmin = [0.0, 0.0]\nmax = [6.0, 0.0]\n" +
+                         fmt::format("door = [2.0, 4.0]\ndoor_opens = {}\n", opens),
+                     {"fem.analysis=static"});
+        const auto solver = solved(scene);
+        const Points& q = solver->bodies()[0].points;
+        double lowest = 0;
+        for (std::size_t p = 0; p < q.count; ++p)
+            if (q.Y[p] < 0.2 && q.X[p] > 2.5 && q.X[p] < 3.5)
+                lowest = std::min(lowest, q.y[p] - q.Y[p]);
+        EXPECT_EQ(lowest < -1e-3, opens < 1) << lowest;
+    }
+}
+
 TEST(FemStatic, LoadIsThatOfTheEndOfTheRamp)
 {
     const auto half = solved(column({"gravity.ramp=2.0"})), full = solved(column({"fem.analysis=static"}));

@@ -1,4 +1,4 @@
-#include "core/materials/material.hpp"
+#include "core/make_material.hpp"
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>
@@ -145,4 +145,21 @@ TEST(Batch, EqualsPointFunction)
     check(HypoelasticExactRotation{moduli_of_test}, false);
     check(VaryingStiffness<LinearElastic>{{moduli_of_test}}, true);
     check(VaryingStiffness<HypoelasticExactRotation>{{moduli_of_test}}, true);
+}
+
+/// What a scene says of strength and softening comes to the law as it was meant.
+TEST(MakeMaterial, StrengthAndSofteningOfAScene)
+{
+    MaterialSpec spec;
+    spec.law = MaterialSpec::Law::mohr_coulomb;
+    spec.density = 1;
+    spec.strength = StrengthSpec{.cohesion = "10", .friction_angle = "0.6", .dilatancy_angle = 0.3, .tensile_strength = 4.0};
+    spec.softening = SofteningSpec{.kind = SofteningSpec::Kind::linear, .residual = 0.4, .strain = 0.2, .band_thickness = 0.1};
+    const auto law = std::get<MohrCoulomb>(make_material(spec, {1e6, 0.3}, {10, std::sin(0.6)}, 0.5, {}));
+    EXPECT_DOUBLE_EQ(law.back.sin_psi(), std::sin(0.3));
+    EXPECT_EQ(law.back.tensile_strength(), 4);
+    // cells five times as wide as the band: the displacement of the band is spread over them
+    EXPECT_NEAR(law.softening.share(0.02), 0.7, 1e-12);
+    EXPECT_NEAR(law.softening.share(0.04), 0.4, 1e-12);
+    EXPECT_NEAR(law.softening.share(0.08), 0.4, 1e-12);
 }

@@ -56,6 +56,17 @@ TEST(PointDriver, ConfinedCompression)
     EXPECT_GT(rows.back()[8], 0);
 }
 
+/// In a step the stress is that in its middle: the work of elastic steps is their energy.
+TEST(PointDriver, WorkOfElasticSteps)
+{
+    std::string elastic = law;
+    elastic.replace(elastic.find("-2e4, -2e4, -2e4"), 16, "0.0, 0.0, 0.0");
+    const auto rows = rows_of(elastic + "[[segment]]\nsteps = 1\ngradient = [2e-6, -1e-6, 0.0, 0.0]\n");
+    const auto& end = rows.back();
+    EXPECT_NEAR(end[9], 0.5 * (end[4] * 2e-6 - end[5] * 1e-6), 1e-12);
+    EXPECT_GT(end[9], 0);
+}
+
 TEST(PointDriver, RefusesWhatHasNoAnswer)
 {
     const auto told = [](const std::string& text)

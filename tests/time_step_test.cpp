@@ -224,6 +224,13 @@ TEST(SafeLimit, IsBelowTheSharpOne)
     EXPECT_NEAR(ratio({"lpfdm", -0.9}), 1, 1e-3);
 }
 
+/// Quadratic B-splines at the edge of the lattice are linear.
+TEST(SharpLimit, OfBSplinesAtTheEdge)
+{
+    for (const double offset : {-3.0, 3.0})
+        expect_sharp({"mpm-bspline", 0.3, 2, 2, {"mpm.scheme=usf"}, offset});
+}
+
 TEST(SafeLimit, FollowsTheState)
 {
     Scene scene = Case{"lpfdm", 0.3, 2}.scene();
@@ -239,6 +246,15 @@ TEST(SafeLimit, FollowsTheState)
     EXPECT_NEAR(limit_of(limits, "stiffness"), std::sqrt(0.7), 1e-12);
     EXPECT_NEAR(limit_of(limits, "hourglass"), 1 / (2 * 0.05), 1e-12);
     EXPECT_GT(limit_of(limits, "convection"), 1e11);
+    Scene damped = scene;
+    damped.damping = DampingSpec{0.5};
+    EXPECT_NEAR(limit_of(make(damped)->step_limits(), "hourglass"), 1 / (2 * 0.05 * 1.5), 1e-12);
+    EXPECT_NEAR(limit_of(make(damped)->step_limits(), "stiffness"), std::sqrt(0.7 / 1.5), 1e-12);
+    // what of the velocity is PIC has gone through the nodes
+    const auto cell = [&](double flip) {
+        return limit_of(make(Case{"mpm-cpgimp", 0.3, 2, 2, {fmt::format("mpm.flip={}", flip)}}.scene())->step_limits(), "stiffness");
+    };
+    EXPECT_NEAR(cell(0.2) / cell(1), std::sqrt(0.6), 1e-12);
     // points that pass a hundredth of a cell in such a step, c_p = 1
     for (const auto& [speed, limit] : {std::pair{"0.0119", -1.0}, std::pair{"0.0121", 0.65}})
     {
@@ -373,6 +389,25 @@ int run(const Scene& scene, Solver& solver, Watch&& watch)
     }
 }
 }  // namespace
+
+/// Where the limit falls as points speed up, the last step ends at the end none the less.
+TEST(AutoStep, EndsAtTheEndWhateverTheSteps)
+{
+    Scene scene = Case{"lpfdm", 0.3, 2}.scene();
+    scene.gravity = GravitySpec{.acceleration = {0, -0.02}};
+    scene.time.end = 7.3;
+    scene.time.follows_limit = true;
+    const auto solver = make(scene);
+    double end = 0, shortest = 1;
+    run(scene, *solver,
+        [&](const StepControl& clock)
+        {
+            end = clock.t();
+            shortest = std::min(shortest, clock.dt());
+        });
+    EXPECT_DOUBLE_EQ(end, 7.3);
+    EXPECT_LT(shortest, 0.8 * 0.5 * std::sqrt(0.7));
+}
 
 /// With a limit that does not change the steps are those of a fixed cfl, bit for bit up to the sum of times.
 TEST(AutoStep, FollowsTheLimitAndEndsAtTheEnd)

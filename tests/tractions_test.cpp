@@ -66,7 +66,7 @@ TEST(Tractions, ActOnEachFace)
 /// It follows the surface into the next cell, and is carried by the nodes that have mass.
 TEST(Tractions, FollowTheSurface)
 {
-    const Scene scene = loaded("left", "[\"1e4\", \"0\"]");
+    const Scene scene = loaded("left", "[\"1e4\", \"3e3\"]");
     const Lattice lattice = make_lattice(scene.grid);
     for (const bool box : {false, true})
     {
@@ -77,7 +77,7 @@ TEST(Tractions, FollowTheSurface)
         for (std::size_t p = 0; p < bodies[0].points.count; ++p)
             bodies[0].points.x[p] -= 0.1;  // a fifth of a cell outwards
         tractions.apply(lattice, bodies, nodes, 0);
-        EXPECT_NEAR(Sums(lattice, nodes, 0, 1).off, 0.2 * 2e4, 1e-6);
+        EXPECT_NEAR(Sums(lattice, nodes, 0, 1).off, 0.2 * (2e4 + 6e3), 1e-6);
         for (std::size_t n = 0; n < lattice.nodes(); ++n)
         {
             nodes.mass[n] = lattice.node_position(n)[0] < 0.9 ? 0 : 1;  // the next line of nodes holds nothing yet
@@ -86,6 +86,7 @@ TEST(Tractions, FollowTheSurface)
         tractions.apply(lattice, bodies, nodes, 0);
         const Sums s(lattice, nodes, 0, 1);
         EXPECT_NEAR(s.fx, 2e4, 1e-6);
+        EXPECT_NEAR(s.fy, 6e3, 1e-6);
         EXPECT_NEAR(s.off, 0, 1e-6);
     }
 }

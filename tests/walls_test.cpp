@@ -280,6 +280,48 @@ TEST(Wall, DoorOpensWhenToldTo)
     EXPECT_EQ(row(), (std::vector<double>{0, 0, 0, 1, 1, 0, 0, 0, 0}));  // its ends hold
 }
 
+/// Its opening goes with a wall that moves along itself.
+TEST(Wall, TakesItsDoorAlong)
+{
+    Fixture f(
+        "[[wall]]\nname = \"gate\"\nmin = [2.0, 0.5]\nmax = [2.0, 3.0]\ndoor = [1.0, 2.0]\nvelocity = [\"0\", \"t < 0.12 ? 5 : 0\"]\n");
+    const auto held = [&]
+    {
+        std::vector<double> vx(f.nodes.vx.size(), 1), vy(f.nodes.vy.size(), 1);
+        f.ops.restrain(f.lattice, f.nodes, vx, vy);
+        std::string row;
+        for (int j = 0; j <= f.lattice.ny; ++j)
+            row += vx[f.lattice.node(4, j)] == 0 ? '#' : '.';
+        return row;
+    };
+    f.ops.begin_step(0, 0.1);
+    EXPECT_EQ(held(), ".##.###..");
+    f.ops.end_step(0.1);
+    f.ops.begin_step(0.1, 0.1);  // a cell farther
+    EXPECT_EQ(held(), "..##.###.");
+}
+
+/// A wall that ends at the edge of the lattice holds the ring of nodes around it, too, of which B-splines know.
+TEST(Wall, TakesTheRingAroundTheLattice)
+{
+    Fixture f("[[wall]]\nname = \"left\"\nmin = [0.0, 0.0]\nmax = [0.0, 4.0]\n");
+    f.ops.begin_step(0, 0.1);
+    std::vector<double> vx(f.nodes.vx.size(), 1), vy(f.nodes.vy.size(), 1);
+    f.ops.restrain(f.lattice, f.nodes, vx, vy);
+    for (int j = -1; j <= f.lattice.ny + 1; ++j)
+        for (int i = -1; i <= 1; ++i)
+            EXPECT_EQ(vx[f.lattice.node(i, j)], i < 1 ? 0 : 1) << i << " " << j;
+}
+
+/// A wall that is smooth in one direction is not stopped by what holds that direction.
+TEST(Wall, SlidesAlongWhatHoldsTheOtherComponent)
+{
+    Fixture f("[[boundary]]\nname = \"base\"\nwhere = \"y <= 0\"\nfix = \"y\"\n[[wall]]\nname = \"plate\"\nmin = [0.0, 0.5]\n"
+              "max = [4.0, 0.5]\nfix = \"x\"\nvelocity = [\"0\", \"t < 0.1 ? -5 : 0\"]\n");
+    f.step(0, 0.1);
+    EXPECT_NO_THROW(f.step(0.1, 0.1));
+}
+
 TEST(Wall, StopsTheRunWhereItCannotGo)
 {
     const std::string base = "[[boundary]]\nname = \"base\"\nwhere = \"y <= 0\"\nfix = \"xy\"\n";
