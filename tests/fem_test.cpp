@@ -1,3 +1,4 @@
+#include "core/guards.hpp"
 #include "core/run.hpp"
 #include "fem_reference/fem.hpp"
 
@@ -304,6 +305,24 @@ TEST(FemStatic, ADoorHoldsNothingOnceOpen)
             if (q.Y[p] < 0.2 && q.X[p] > 2.5 && q.X[p] < 3.5)
                 lowest = std::min(lowest, q.y[p] - q.Y[p]);
         EXPECT_EQ(lowest < -1e-3, opens < 1) << lowest;
+    }
+}
+
+/// The largest component of the strain itself, whatever the stress beside it.
+TEST(FemStatic, SaysWhenStrainsAreNotSmall)
+{
+    for (const double share : {0.8, 1.2})
+    {
+        const Scene scene = scene_of(
+            soil + box("column", 0, 0, 2, H) + supports +
+                fmt::format("[[wall]]\nname = \"cap\"\nmin = [0.0, 4.0]\nmax = [2.0, 4.0]\nfix = \"y\"\nvelocity = [\"0\", \"{}\"]\n",
+                            -share * limits::small_strain * H),
+            {"fem.analysis=static"});
+        const auto solver = solved(scene);
+        Guards guards(scene, *solver, 1);
+        guards.watch(GuardSample{}, *solver);
+        const auto found = guards.findings(true);
+        EXPECT_EQ(std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.code == "small_strain"; }), share > 1);
     }
 }
 

@@ -112,12 +112,13 @@ def main():
     parser.add_argument("-j", "--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--tests", default="", help="only tests whose name this regular expression finds")
     parser.add_argument("--files", default="", help="only slips in files whose name this regular expression finds")
+    parser.add_argument("--slips", type=int, nargs="+", help="only slips of these numbers")
     options = parser.parse_args()
     folder = options.folder.resolve()
     slips = copy_sources(folder / "src")
     build(folder / "src", folder / "build", options.jobs)
     tests = [t for t in find_tests(folder / "src", folder / "build") if re.search(options.tests, t.name)]
-    chosen = [s for s in slips if re.search(options.files, s.file)]
+    chosen = [s for s in slips if re.search(options.files, s.file) and s.number in (options.slips or [s.number])]
     results_file = folder / "results.json"
     known = json.loads(results_file.read_text()) if results_file.is_file() else {}
     key = lambda s: f"{s.file}: {s.before}«{s.of}»{s.after} -> {s.to}"  # noqa: E731
