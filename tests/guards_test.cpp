@@ -210,6 +210,22 @@ TEST(Ledger, KnowsTheWorkOfBlows)
         }
 }
 
+/// A smooth wall whose face lies between two lines of nodes, against a free body: what the blow gives is no energy made.
+TEST(Ledger, KnowsTheBlowOfAFaceBetweenNodes)
+{
+    for (const std::string method : {"lpfdm", "mpm-cpgimp"})
+    {
+        const std::string press = "[[wall]]\nname = \"press\"\nmin = [-0.5, 1.4]\nmax = [1.5, 2.0]\nfix = \"y\"\nvelocity = [\"0\", "
+                                  "\"-0.3\"]\nmotion = \"smooth\"\n";
+        const Watched w = watch(block(press, 0.4, 0.02), method, {"time.cfl=0.1"}, 1);
+        double made = 0;
+        for (const GuardSample& g : w.samples)
+            made = std::max(made, g.energy.numerical / w.scale());
+        EXPECT_GT(w.end().kinetic, 0) << method;
+        EXPECT_LT(made, 0.003) << method;
+    }
+}
+
 /// Free bodies: all that comes in moves them.
 TEST(Ledger, KnowsTheWorkOnAFreeBody)
 {

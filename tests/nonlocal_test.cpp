@@ -88,6 +88,7 @@ TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
         if (const double r = std::hypot(q.x[p] - q.x[700], q.y[p] - q.y[700]); r > 0.3)
             EXPECT_TRUE(r > 1.1 || q.softening_strain[p] > 0) << r;
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::gauss}, 2), std::exp(-1.0));
+    EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::gauss}, 1), std::exp(-0.25));
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::galavi_schweiger}, 1),
               0.5 * std::exp(-0.25));
 }

@@ -10,6 +10,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -114,6 +115,7 @@ def main():
     parser.add_argument("--files", default="", help="only slips in files whose name this regular expression finds")
     parser.add_argument("--slips", type=int, nargs="+", help="only slips of these numbers")
     options = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # some tests interrupt a run; a shell's background jobs would ignore it
     folder = options.folder.resolve()
     slips = copy_sources(folder / "src")
     build(folder / "src", folder / "build", options.jobs)
