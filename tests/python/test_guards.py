@@ -110,3 +110,48 @@ def test_soundness_in_files_metrics_and_page(tmp_path):
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page))
     assert "4 runs: 1 suspect, 3 completed." in text
     assert "energy: made &lt;2&gt; J/m; volume: a point grew; cause: null_mode, remedy: lpfdm.hourglass=0.05" in text
+
+
+def flight(folder, more=""):
+    scene = Path(folder) / "scene.toml"
+    scene.write_text("""[grid]
+size = [4.0, 4.0]
+cell_size = 0.5
+[time]
+end = 0.6
+dt = 0.03
+[output]
+history = 0.1
+[[material]]
+name = "soil"
+law = "linear_elastic"
+density = 1000.0
+youngs_modulus = 1e3
+poissons_ratio = 0.2
+[[body]]
+name = "block"
+material = "soil"
+shape = "box"
+min = [1.0, 1.0]
+max = [2.0, 2.0]
+velocity = ["0.5", "0"]
+""" + more)
+    return scene
+
+
+def test_the_history_tells_how_far_points_go_in_a_step_and_samples_the_nearest_ones(tmp_path):
+    done = run(flight(tmp_path), "-o", tmp_path / "r.h5")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert file["history/courant_motion"][-1] == pytest.approx(0.5 * 0.03 / 0.5)
+        assert file["history/time"][()] == pytest.approx([0.0, 0.09, 0.21, 0.3, 0.39, 0.51, 0.6])
+
+
+def test_rest_is_not_found_before_gravity_is_there(tmp_path):
+    base = "[[boundary]]\nname = \"base\"\nwhere = \"y <= 1\"\nfix = \"xy\"\n"
+    scene = flight(tmp_path, base + "[damping]\nlocal = 0.8\n[gravity]\nacceleration = [0.0, -0.1]\nramp = 40.0\nprofile = \"linear\"\n")
+    settings = ("time.end=80", "time.stop_unbalanced=0.5", "body.block.velocity=[\"0\",\"0\"]", "output.history=1")
+    done = run(scene, *[word for s in settings for word in ("--set", s)], "-o", tmp_path / "r.h5")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert 40.0 <= file["history/time"][-1] < 79.0

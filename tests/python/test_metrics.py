@@ -1,9 +1,10 @@
 """Metric groups on synthetic results whose numbers are known."""
 import math
 
+import h5py
 import numpy as np
 import pytest
-from synthetic import PERIOD, TIP, write_result
+from synthetic import H, PERIOD, TIP, write_result
 from testbed_reports import metrics
 from testbed_reports.results import Result, ResultError
 
@@ -190,3 +191,22 @@ def test_attributes_are_checked(tmp_path):
         file.attrs["format_version"] = 2
     with pytest.raises(ResultError, match="format_version 2"):
         Result(path)
+
+
+def test_energy_lost_is_a_drift_too(make):
+    r = rows(make(metrics="energy", energy_slope=-0.5, samples=801))
+    assert r["energy_drift", "per_period"] == pytest.approx(0.5 * PERIOD / 200.0, rel=1e-3)
+
+
+def test_scaled_displacement_is_weighted_by_volume(tmp_path):
+    path = write_result(tmp_path / "r.h5", metrics="displacement", sealed=False)
+    with h5py.File(path, "r+") as file:
+        where = file["snapshots/0001"]
+        volume = where["initial_volume"][()]
+        high = where["initial_position"][()][:, 1] > 0.5 * H
+        volume[high] *= 5.0
+        where["initial_volume"][...] = volume
+        error = np.linalg.norm(where["displacement"][()] - where["exact_displacement"][()], axis=1)
+    expected = np.sqrt(np.sum(volume * error**2) / np.sum(volume)) / TIP
+    assert rows(Result(path))["displacement", "rms_scaled"] == pytest.approx(expected, rel=1e-12)
+    assert abs(np.sqrt(np.mean(error**2)) / TIP / expected - 1) > 0.05

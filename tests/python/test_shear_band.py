@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 from synthetic_soil import lattice
-from testbed_reports.shear_band import ESTIMATORS, estimate_widths, find_bands, half_max_width, widths
+from testbed_reports.shear_band import ESTIMATORS, Band, estimate_widths, find_bands, half_max_width, widths
 
 SHAPES = {"uniform": lambda d, w: (np.abs(d) < w / 2) * 1.0,
           "cosine": lambda d, w: np.where(np.abs(d) < w / 2, 0.5 * (1.0 + np.cos(2.0 * np.pi * d / w)), 0.0),
@@ -135,3 +135,9 @@ def test_noise_on_a_band():
     band, = find_bands(x, strain, np.full(len(x), 0.0125**2), 0.0125)
     assert band.inclination == pytest.approx(55.0, abs=0.3)
     assert widths(band)["half_max"] == pytest.approx(0.1, rel=0.1)
+
+
+def test_one_odd_normal_does_not_change_the_width():
+    d = np.linspace(-1.0, 1.0, 401)
+    band = Band(0.0, 0.0, 1.0, d=d, normals=np.array([np.where(np.abs(d) < 0.1, 1.0, 0.0)] * 4 + [np.where(np.abs(d) < 0.8, 1.0, 0.0)]))
+    assert widths(band)["half_max"] == pytest.approx(0.2, abs=0.01)

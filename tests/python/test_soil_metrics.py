@@ -1,10 +1,11 @@
 """Metric groups of soil tests on histories and points whose numbers are known."""
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from synthetic_soil import lattice, toml_curves, vectors, write_soil
-from testbed_reports import metrics
+from testbed_reports import metrics, soil_metrics
 from testbed_reports.results import Result
 
 SQUARE = lattice(1.0, 1.0, 0.25)
@@ -208,3 +209,32 @@ def test_a_run_that_did_not_complete_gives_nan(soil, status):
         lost, full = rows(build(status)), rows(build("completed"))
         assert set(lost) == set(full)
         assert all(math.isnan(v) for v in lost.values())
+
+
+def test_a_crumb_on_the_layer_is_no_part_of_the_heap(soil):
+    X = lattice(3.0, 1.0, 0.1)
+    X = X[(X[:, 1] < 0.5) | (X[:, 0] < 0.8)]
+    X = np.vstack([X, [[2.05, 0.55, 0.0]]])
+    assert rows(soil(X, 0.1, metrics="runout", reference={"base": 0.5, "front_height": 0.2}))["runout", "front"] == pytest.approx(0.8)
+
+
+def test_the_elastic_share_of_the_load_is_that_of_the_scene(soil):
+    crest = 1e-3 * 10.0 * G + 2e-3 * np.clip(10.0 * G - 1.0, 0.0, None) + 0.05 * np.clip(10.0 * G - 6.0, 0.0, None) ** 2
+
+    def first(share):
+        load = 10.0 * G
+        early = load <= share * load.max()
+        excess = crest - np.polyval(np.polyfit(load[early], crest[early], 1), load)
+        k = np.flatnonzero(excess > 0.0125)[0]
+        return np.interp(0.0125, excess[k - 1:k + 1], load[k - 1:k + 1])
+
+    for share in (0.2, 0.5):
+        assert rows(collapse(soil, crest, elastic_share=share))["collapse_load", "first"] == pytest.approx(first(share), abs=1e-9)
+    assert abs(first(0.2) - first(0.5)) > 0.05
+
+
+def test_a_row_of_a_layer_is_weighted_by_volume():
+    final = {"initial_position": np.array([[0.0, 0.5, 0.0], [1.0, 0.5, 0.0], [0.0, 1.5, 0.0]]),
+             "initial_volume": np.array([1.0, 3.0, 1.0]), "plastic_shear_strain": np.array([0.4, 0.0, 0.2])}
+    y, strain, height = soil_metrics.layer_profile(SimpleNamespace(final=final))
+    assert y == pytest.approx([0.5, 1.5]) and strain == pytest.approx([0.1, 0.2]) and height == pytest.approx(1.0)

@@ -90,3 +90,19 @@ def test_an_exponent_is_fitted_to_every_run_not_to_means(tmp_path):
                          change=lambda v, L, r: {"stress_error": 0.01 * factor[L, r], "seed": r})
     measured = verdict(read_study_folder(folder), "exponent_max", value=9.0).measured
     assert measured.startswith(f"{1.0 - 1.0 / 0.6931471805599453:.2f} [")
+
+
+def test_a_range_of_sizes_with_one_end(study):
+    """`L_from` is where a range begins as cells become smaller, `L_to` where it ends."""
+    assert verdict(study, "value_max", value=0.021, L_from=1.0).verdict == "pass"  # 0.02 at 1, less below
+    assert verdict(study, "value_min", value=0.019, L_from=1.0).verdict == "fail"
+    assert verdict(study, "value_min", value=0.019, L_to=1.0).verdict == "pass"  # 0.02 at 1, more above
+    assert verdict(study, "value_max", value=0.021, L_to=1.0).verdict == "fail"
+
+
+def test_convergence_that_ends_is_none(tmp_path):
+    """The finer half of the sizes counts."""
+    stays = {2.0: 0.4, 1.0: 0.1, 0.5: 0.02, 0.25: 0.02}
+    found = read_study_folder(write_study(tmp_path / "column", metrics="stress", models={"lpfdm": stays.__getitem__}))
+    assert verdict(found, "not_converging").verdict == "pass"
+    assert verdict(found, "order_min", value=1.0).verdict == "pass"
