@@ -199,7 +199,7 @@ def test_energy_lost_is_a_drift_too(make):
 
 
 def test_scaled_displacement_is_weighted_by_volume(tmp_path):
-    path = write_result(tmp_path / "r.h5", metrics="displacement", sealed=False)
+    path = write_result(tmp_path / "r.h5", metrics="displacement", displacement_error=0.1, sealed=False)
     with h5py.File(path, "r+") as file:
         where = file["snapshots/0001"]
         volume = where["initial_volume"][()]

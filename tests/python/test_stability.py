@@ -124,14 +124,16 @@ def test_a_limit_of_the_time_step_stands_beside_the_stated_and_the_sharp_one():
         return SimpleNamespace(result=result, values={"time.cfl": cfl, "case": "c", "nu": 0.3}, search="s", rows={},
                                verdict=SimpleNamespace(level=level, rank=0))
 
-    def limits(**known):
+    def limits(more=(), **known):
         search = Bisection("time.cfl", 1.0, 2.0, "sound", 0.1)
         study = SimpleNamespace(spec=SimpleNamespace(combinations=[SimpleNamespace(case="c", bisection=search)]),
-                                runs=[run(1.0, "sound", **known), run(1.5, "sound", **known), run(1.6, "failed", **known), run(2.0, "failed", **known)],
+                                runs=[run(1.0, "sound", **known), run(1.5, "sound", **known), run(1.6, "failed", **known), run(2.0, "failed", **known), *more],
                                 case=lambda name: SimpleNamespace(axis_keys=["nu", "time.cfl"]))
         (limit,) = find_limits(study)
         return limit
 
+    for more in ([run(1.2, "failed"), run(1.2, "sound")], [run(1.2, "sound"), run(1.2, "failed")]):  # of repeats the worst counts
+        assert limits(more).measured == (1.0, 1.2)
     limit = limits(dt_critical=0.01, dt_sharp=0.0125)
     assert limit.step == pytest.approx((0.6, 0.64)) and (limit.stated, limit.sharp) == pytest.approx((0.4, 0.5))
     assert limit.below.rows == pytest.approx({("limit", "measured"): 1.5, ("limit", "ratio"): 1.55, ("limit", "sharp_ratio"): 1.24})

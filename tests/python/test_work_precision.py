@@ -1,4 +1,6 @@
 """Costs, fronts and what reaches an accuracy; the section of testbed bench."""
+from types import SimpleNamespace
+
 import pytest
 from synthetic import write_study
 from testbed_reports import bench
@@ -88,3 +90,14 @@ def test_a_broken_bench_is_told(tmp_path):
     (folder / "bench.csv").write_text("method,law\nlpfdm,elastic\n")
     page = build([folder], tmp_path / "out", "testbed report b").read_text()
     assert "not written by testbed bench" in page
+
+
+def test_repeats_count_by_the_mean_of_their_errors_and_the_median_of_their_times():
+    def run(repeat, error, seconds):
+        values = {"L": 0.5, "variant": "lpfdm", "repeat": repeat, "seed": repeat}
+        rows = {("stress", "l2"): error, ("solve_s", ""): seconds}
+        return SimpleNamespace(values={k: v for k, v in values.items() if k != "seed"}, completed=True, value=lambda q, n="": rows[q, n],
+                               result=SimpleNamespace(performance={"dofs": 8}, provenance={"load_average": 0.1}))
+    (only,), lost = costs_of([run(1, 0.1, 1.0), run(2, 0.2, 9.0), run(3, 0.6, 2.0)], {"quantity": "stress", "norm": "l2"}, 2)
+    assert not lost and only.error == pytest.approx(0.3)
+    assert (only.least_s, only.solve_s, only.most_s) == (1.0, 2.0, 9.0)
