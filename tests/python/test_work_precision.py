@@ -41,7 +41,7 @@ def cost(error, seconds, busy=False):
 
 
 def test_cheapest_is_the_fastest_that_is_good_enough():
-    costs = [cost(0.02, 1.0), cost(0.009, 3.0), cost(0.005, 2.0)]
+    costs = [cost(0.02, 1.0), cost(0.009, 3.0), cost(0.005, 2.0), cost(0.004, 5.0)]
     assert cheapest(costs, 0.01).solve_s == 2.0
     assert cheapest(costs, 0.001) is None
 
