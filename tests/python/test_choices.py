@@ -7,6 +7,8 @@ from synthetic import write_study
 from testbed_reports import components, failures, matrix, tables
 from testbed_reports.bisection import Bisection, next_values
 from testbed_reports.dataset import read_study_folder
+from testbed_reports.figures import draw
+from testbed_reports.style import Style
 from testbed_reports.values import same
 from testbed_reports.work_precision import reach
 
@@ -73,3 +75,11 @@ def test_mean_stress_is_of_three_components():
 
 def test_numbers_are_the_same_to_rounding_only():
     assert same(0.3, 0.1 + 0.2) and not same(1.0, 1.0001)
+
+
+def test_a_power_law_is_fitted_over_the_sizes_asked_for(tmp_path):
+    folder = write_study(tmp_path / "column", metrics="stress", models={"lpfdm": lambda L: 0.02 * L**2 if L > 0.6 else 0.02})
+    study = read_study_folder(folder)
+    entry = {"kind": "power_law", "quantity": "stress", "norm": "l2", "where": {}, "series": ["variant"], "L_from": 2.0, "L_to": 1.0}
+    figure = draw(study, entry, Style(study.variants())).figure
+    assert "q = 2.00" in " ".join(text.get_text() for legend in figure.legends for text in legend.get_texts())

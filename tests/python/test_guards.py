@@ -155,3 +155,17 @@ def test_rest_is_not_found_before_gravity_is_there(tmp_path):
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "r.h5") as file:
         assert 40.0 <= file["history/time"][-1] < 79.0
+
+
+def test_a_truncated_share_is_that_of_all_points_of_a_material(tmp_path):
+    """One point in one body, 400 in another; of relative deviations of 2 a third is cut at zero."""
+    scene = flight(tmp_path)
+    text = scene.read_text().replace('law = "linear_elastic"', 'law = "mohr_coulomb"')
+    strength = "[material.strength]\ncohesion = 9800.0\nfriction_angle = 0.5\n[material.random]\nseed = 1\ncohesion_deviation = 2.0\n[[body]]\n"
+    crumb = '[[body]]\nname = "crumb"\nmaterial = "soil"\nshape = "box"\nmin = [3.0, 3.0]\nmax = [3.5, 3.5]\npoints_per_cell = 1\n'
+    scene.write_text(text.replace("[[body]]\n", strength) + "points_per_cell = 10\n" + crumb)
+    done = run(scene, "--set", "time.end=0.06", "-o", tmp_path / "r.h5")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "r.h5") as file:
+        share = file["materials/soil"].attrs["truncated_share"]
+    assert share * 401 == pytest.approx(round(share * 401), abs=1e-9) and 0.22 < share < 0.40
