@@ -8,6 +8,7 @@ from testbed_reports import components, failures, matrix, tables
 from testbed_reports.bisection import Bisection, next_values
 from testbed_reports.dataset import read_study_folder
 from testbed_reports.figures import draw
+from testbed_reports.search import Searches
 from testbed_reports.style import Style
 from testbed_reports.values import same
 from testbed_reports.work_precision import reach
@@ -83,3 +84,13 @@ def test_a_power_law_is_fitted_over_the_sizes_asked_for(tmp_path):
     entry = {"kind": "power_law", "quantity": "stress", "norm": "l2", "where": {}, "series": ["variant"], "L_from": 2.0, "L_to": 1.0}
     figure = draw(study, entry, Style(study.variants())).figure
     assert "q = 2.00" in " ".join(text.get_text() for legend in figure.legends for text in legend.get_texts())
+
+
+def test_of_repeats_in_a_search_the_worst_counts():
+    search = Searches.__new__(Searches)
+    search.combinations = {"s": SimpleNamespace(bisection=Bisection("k", 1.0, 2.0, "sound", 0.1), at=lambda value: value)}
+    search.levels = {"a": "sound", "b": "sound", "c": "failed", "d": "sound", "e": "failed"}
+    entries = [{"id": name, "search": "s", "axes": {"k": k}} for name, k in (("a", 1.0), ("b", 1.0), ("c", 1.5), ("d", 1.5), ("e", 2.0))]
+    for order in (entries, entries[::-1]):
+        (value,) = search.next(order)
+        assert 1.0 < value < 1.5

@@ -140,11 +140,13 @@ velocity = ["0.5", "0"]
 
 
 def test_the_history_tells_how_far_points_go_in_a_step_and_samples_the_nearest_ones(tmp_path):
-    done = run(flight(tmp_path), "-o", tmp_path / "r.h5")
+    done = run(flight(tmp_path, '[[probe]]\nname = "left"\nwhere = "X < 1.6"\n'), "-o", tmp_path / "r.h5")
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "r.h5") as file:
         assert file["history/courant_motion"][-1] == pytest.approx(0.5 * 0.03 / 0.5)
         assert file["history/time"][()] == pytest.approx([0.0, 0.09, 0.21, 0.3, 0.39, 0.51, 0.6])
+        assert file["history/probes/left/displacement"][-1, 0] == pytest.approx(0.5 * 0.6)  # the mean over its points
+        assert file["history/probes/left/velocity"][-1, 0] == pytest.approx(0.5)
 
 
 def test_rest_is_not_found_before_gravity_is_there(tmp_path):
