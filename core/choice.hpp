@@ -1,21 +1,21 @@
 #pragma once
-/// Closed choices: an enum with one table of names, which parser, documentation, lists and messages share. What is done is decided by a
-/// switch, which the compiler checks.
+/// Closed choices: an enum with one table of names, which parser, documentation, lists and messages share. What is done for each is
+/// decided by a switch, which the compiler checks.
 ///
 ///     enum class Scheme { usl, usf };
-///     constexpr auto names(Scheme) { return choice_names({{Scheme::usl, "usl"}, {Scheme::usf, "usf"}}); }
+///     constexpr auto names(Scheme) { return choice_names<Scheme>({{Scheme::usl, "usl"}, {Scheme::usf, "usf"}}); }
 
-#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace testbed
 {
-/// The table of an enum's names.
+/// The table of an enum's names, found with the enum.
 template <class E, std::size_t N>
 constexpr std::array<std::pair<E, const char*>, N> choice_names(const std::pair<E, const char*> (&names)[N])
 {

@@ -84,12 +84,13 @@ public:
         const toml::node* node = find(key);
         if (!node)
             return;
-        std::string text;
-        read(full(key), *node, text);
-        if (const auto found = find_choice<E>(text))
+        const auto text = node->value_exact<std::string>();
+        if (!text)
+            return problems_.add(full(key), "a string is asked, not a " + kind_of(*node));
+        if (const auto found = find_choice<E>(*text))
             value = *found;
         else
-            problems_.add(full(key), fmt::format("'{}' is not a choice", text) + suggestion(text, names_of<E>()));
+            problems_.add(full(key), fmt::format("'{}' is not a choice", *text) + suggestion(*text, names_of<E>()));
     }
     template <Choice E>
     void required_choice(const char* key, E& value, const char* doc)

@@ -46,8 +46,8 @@ bool Wall::begin_step(double t, double dt, Restraint& restraint)
         return others;
     const Vec2 v = (*velocity_)({.t = t + 0.5 * dt});
     travel_rate_ = v;
-    restraint.components[0].velocity = spec_.fix == Fix::y ? 0 : v[0];
-    restraint.components[1].velocity = spec_.fix == Fix::x ? 0 : v[1];
+    for (std::size_t k = 0; k < 2; ++k)
+        restraint.components[k].velocity = fixes(spec_.fix, k) ? v[k] : 0;
     return others;
 }
 
@@ -106,10 +106,10 @@ void Wall::take_nodes(const Region& region, Restraint& restraint)
     if (taken_)
         std::set_difference(nodes.begin(), nodes.end(), covered_.begin(), covered_.end(), std::back_inserter(new_nodes_));
     covered_ = nodes;
-    for (ComponentRestraint& component : restraint.components)
+    for (std::size_t k = 0; k < 2; ++k)
     {
-        component.pairs.clear();
-        component.nodes = fixes(spec_.fix, &component == &restraint.components[0] ? 0 : 1) ? nodes : std::vector<NodeIndex>{};
+        restraint.components[k].pairs.clear();
+        restraint.components[k].nodes = fixes(spec_.fix, k) ? nodes : std::vector<NodeIndex>{};
     }
 }
 
@@ -151,10 +151,11 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
     for (const FacePair& p : pairs)
         at_faces.insert(at_faces.end(), {p.low, p.high});
     std::sort(at_faces.begin(), at_faces.end());
-    for (ComponentRestraint& component : restraint.components)
+    for (std::size_t k = 0; k < 2; ++k)
     {
-        if (!fixes(spec_.fix, &component == &restraint.components[0] ? 0 : 1))
+        if (!fixes(spec_.fix, k))
             continue;
+        ComponentRestraint& component = restraint.components[k];
         component.pairs = pairs;
         std::erase_if(component.nodes, [&](const NodeIndex& n) { return std::binary_search(at_faces.begin(), at_faces.end(), n); });
     }

@@ -1,8 +1,7 @@
 /// States written and read again: the steps that follow have the same bits.
 
-#include "lpfdm/lpfdm.hpp"
-#include "mpm/mpm.hpp"
 #include "tests/scenes.hpp"
+#include "tests/solvers.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,10 +11,7 @@ using namespace testbed;
 
 namespace
 {
-std::unique_ptr<Solver> make(const Scene& scene)
-{
-    return family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene);
-}
+using test::make;
 
 void step(Solver& solver, int n, double dt)
 {

@@ -4,9 +4,8 @@
 #include "core/diagnosis.hpp"
 #include "core/field_guards.hpp"
 #include "core/observer.hpp"
-#include "lpfdm/lpfdm.hpp"
-#include "mpm/mpm.hpp"
 #include "scenes.hpp"
+#include "tests/solvers.hpp"
 
 #include <map>
 #include <numbers>
@@ -86,7 +85,7 @@ struct Watched
 Watched watch(const std::string& text, const std::string& method, const std::vector<std::string>& overrides = {}, int every = 5)
 {
     Watched w{test::load(text, method, overrides)};
-    w.solver = find_variant(method).family == Family::mpm ? make_mpm(w.scene) : make_lpfdm(w.scene);
+    w.solver = test::make(w.scene);
     Observer observer(w.scene, *w.solver);
     const double dt = time_step(w.scene, *w.solver), critical = w.solver->critical_time_step(w.scene);
     Guards guards(w.scene, *w.solver, critical);
@@ -122,7 +121,7 @@ double closes(const std::string& method)
     return method == "lpfdm" ? 1e-3 : method == "lpfdm-2000" ? 2e-3 : 1e-2;
 }
 
-const std::vector<std::string> all_methods{"lpfdm-2000", "lpfdm", "mpm-linear", "mpm-linear-bbar", "mpm-bspline", "mpm-cpgimp"};
+using test::all_methods;
 
 /// A block that is let go on a smooth floor: the work of gravity is in strain and motion, and what is left is that of the time step.
 TEST(Ledger, ClosesForABouncingBlock)

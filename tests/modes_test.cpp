@@ -1,9 +1,8 @@
 /// The one-step map of small bodies: what is known of it must be found.
 
 #include "core/spectrum.hpp"
-#include "lpfdm/lpfdm.hpp"
-#include "mpm/mpm.hpp"
 #include "tests/scenes.hpp"
+#include "tests/solvers.hpp"
 
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -39,7 +38,7 @@ struct Case
 
     Case(const std::string& text, const std::string& method, const std::vector<std::string>& overrides = {}, int steps = 1)
         : scene(test::load(text, method, overrides)),
-          solver(family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene)),
+          solver(test::make(scene)),
           dt(scene.time.dt.value_or(scene.time.cfl / wave_speed))
     {
         for (int n = 0; n < steps; ++n, t += dt)

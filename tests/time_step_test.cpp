@@ -3,9 +3,8 @@
 #include "core/method_limits.hpp"
 #include "core/observer.hpp"
 #include "core/step_control.hpp"
-#include "lpfdm/lpfdm.hpp"
-#include "mpm/mpm.hpp"
 #include "tests/scenes.hpp"
+#include "tests/solvers.hpp"
 
 #include <cmath>
 #include <fmt/format.h>
@@ -15,10 +14,7 @@ using namespace testbed;
 
 namespace
 {
-std::unique_ptr<Solver> make(const Scene& scene)
-{
-    return family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene);
-}
+using test::make;
 
 /// Elastic cells with c_p = 1 m/s on a lattice with L = 1 m, at rest but for a velocity far too small to move or turn anything.
 struct Case
@@ -97,8 +93,6 @@ bool is_unstable(const Scene& scene, double dt, int steps = 2000)
     return false;
 }
 
-const std::vector<std::string> particle_methods{"lpfdm-2000", "lpfdm", "mpm-linear", "mpm-linear-bbar", "mpm-bspline", "mpm-cpgimp"};
-
 /// The sharp limit within 3 % of what the steps do.
 void expect_sharp(const Case& c)
 {
@@ -131,13 +125,13 @@ TEST(SharpLimit, IsThatOfAnIsolatedCellByHand)
 
 TEST(SharpLimit, IsWhatTheStepsDo)
 {
-    for (const auto& method : particle_methods)
+    for (const auto& method : test::all_methods)
         for (const double nu : {-0.9, 0.3, 0.4999})
         {
             expect_sharp({method, nu, 1, 2});
             expect_sharp({method, nu, 4, 2});
         }
-    for (const auto& method : particle_methods)
+    for (const auto& method : test::all_methods)
         for (const int n : {3, 4})
             expect_sharp({method, 0.3, 1, n});
     expect_sharp({"lpfdm", 0.3, 1, 1});  // with one point in one cell musl has no limit
@@ -169,7 +163,7 @@ TEST(SharpLimit, OfCellContent)
 
 TEST(SharpLimit, OfDampingHourglassStiffnessAndSupports)
 {
-    for (const auto& method : particle_methods)
+    for (const auto& method : test::all_methods)
         for (const double alpha : {0.3, 0.9})
         {
             const Case plain{method, 0.3, 1, 2}, damped{method, 0.3, 1, 2, {fmt::format("damping.local={}", alpha)}};
@@ -181,7 +175,7 @@ TEST(SharpLimit, OfDampingHourglassStiffnessAndSupports)
     for (const double chi : {0.0, 0.3, 0.5})
         for (const int cells : {1, 4})
             expect_sharp({"lpfdm", 0.3, cells, 2, {fmt::format("lpfdm.hourglass={}", chi)}});
-    for (const auto& method : particle_methods)
+    for (const auto& method : test::all_methods)
     {
         expect_sharp({method, 0.3, 4, 2, {}, 0.3, "1+99*(X>5.3)"});
         expect_sharp({method, 0.3, 4, 2, {}, 0.3});
@@ -199,7 +193,7 @@ TEST(SafeLimit, IsBelowTheSharpOne)
         EXPECT_LE(safe, sharp * (1 + 1e-3)) << c.name();
         return sharp / safe;
     };
-    for (const auto& method : particle_methods)
+    for (const auto& method : test::all_methods)
         for (const double nu : {-0.9, 0.0, 0.3, 0.4999})
             for (const int n : {2, 3, 4})
                 for (const int cells : {1, 4})
@@ -217,7 +211,7 @@ TEST(SafeLimit, IsBelowTheSharpOne)
                                 << method << " " << nu << " " << n << " " << cells << " " << offset;
                         }
                     }
-    for (const auto& method : particle_methods)
+    for (const auto& method : test::all_methods)
         for (const double offset : {0.0, 0.25, 0.4999, 0.5001})
             ratio({method, 0.3, 4, 1, {}, offset});
     EXPECT_NEAR(ratio({"lpfdm-2000", 0.3}), 1, 1e-3);

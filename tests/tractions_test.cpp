@@ -15,6 +15,14 @@ Scene loaded(const std::string& face, const std::string& traction)
                       "", {"body.soil.points_per_cell=3"});
 }
 
+struct FaceOfBlock
+{
+    const char* name;
+    std::size_t normal;
+    double at;
+};
+const std::array<FaceOfBlock, 4> faces{{{"left", 0, 1}, {"right", 0, 3}, {"bottom", 1, 1}, {"top", 1, 3}}};
+
 /// Sums of the forces at the nodes and of their moments about the origin; `off`: of what acts off the line x_k = at.
 struct Sums
 {
@@ -38,13 +46,7 @@ struct Sums
 /// The load goes to the nodes of the face, with the right sum and moment.
 TEST(Tractions, ActOnEachFace)
 {
-    struct Face
-    {
-        const char* name;
-        std::size_t normal;
-        double at;
-    };
-    for (const Face& face : {Face{"left", 0, 1}, {"right", 0, 3}, {"bottom", 1, 1}, {"top", 1, 3}})
+    for (const FaceOfBlock& face : faces)
         for (const bool box : {false, true})
         {
             SCOPED_TRACE(face.name);
@@ -94,13 +96,7 @@ TEST(Tractions, FollowTheSurface)
 /// The surface is half of the point's own box away, in the direction of the face alone, however the box was stretched.
 TEST(Tractions, ActOnTheEdgeOfAStretchedBox)
 {
-    struct Face
-    {
-        const char* name;
-        std::size_t normal;
-        double at;
-    };
-    for (const Face& face : {Face{"left", 0, 1}, {"right", 0, 3}, {"bottom", 1, 1}, {"top", 1, 3}})
+    for (const FaceOfBlock& face : faces)
     {
         SCOPED_TRACE(face.name);
         const Scene scene = loaded(face.name, "[\"7\", \"7\"]");

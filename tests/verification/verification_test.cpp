@@ -4,9 +4,8 @@
 #include "core/method_limits.hpp"
 #include "core/observer.hpp"
 #include "core/run.hpp"
-#include "lpfdm/lpfdm.hpp"
-#include "mpm/mpm.hpp"
 #include "tests/scenes.hpp"
+#include "tests/solvers.hpp"
 
 #include <fmt/core.h>
 #include <gtest/gtest.h>
@@ -27,7 +26,7 @@ template <class Watch>
 Outcome run(const std::string& name, const std::string& method, const std::vector<std::string>& overrides, Watch&& watch)
 {
     Outcome s{load_scene(std::string(BENCHMARKS) + "/" + name + "/scene.toml", method, overrides).scene, nullptr};
-    s.solver = find_variant(method).family == Family::mpm ? make_mpm(s.scene) : make_lpfdm(s.scene);
+    s.solver = test::make(s.scene);
     const double dt = time_step(s.scene, *s.solver);
     const int steps = static_cast<int>(std::ceil(s.scene.time.end / dt));
     for (int n = 0; n <= steps; ++n)
@@ -64,7 +63,7 @@ Errors errors(const Outcome& s)
     double ds = 0, es = 0, du = 0, eu = 0, l1 = 0, largest = 0;
     const auto X = [&] {  // by id, for scenes of one body
         std::vector<Vec2> all(s.solver->bodies()[0].points.count);
-        const auto first = family_of(s.scene) == Family::mpm ? make_mpm(s.scene) : make_lpfdm(s.scene);
+        const auto first = test::make(s.scene);
         const Points& q = first->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
             all[q.id[p]] = {q.x[p], q.y[p]};
@@ -261,7 +260,7 @@ traction = ["50", "0"]
     const auto after = [](const std::string& text, const std::string& method, const std::vector<std::string>& overrides)
     {
         const Scene s = test::load(text, method, overrides);
-        const auto solver = find_variant(method).family == Family::mpm ? make_mpm(s) : make_lpfdm(s);
+        const auto solver = test::make(s);
         for (int n = 0; n < 350; ++n)
         {
             solver->prepare(n * 0.01, 0.01);
