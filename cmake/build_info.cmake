@@ -6,7 +6,7 @@ if(NOT commit)
 elseif(changes)
   set(commit "${commit}+changes")
 endif()
-set(text "#include \"core/provenance.hpp\"
+set(text "#include \"core/base/provenance.hpp\"
 namespace testbed
 {
 const Build& build()

@@ -1,7 +1,7 @@
 #include "fem_reference/elasticity.hpp"
 
-#include "core/geometry.hpp"
-#include "core/walls.hpp"
+#include "core/loads/walls.hpp"
+#include "core/scene/geometry.hpp"
 
 #include <deal.II/base/quadrature_lib.h>
 #include <deal.II/base/symmetric_tensor.h>

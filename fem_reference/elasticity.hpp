@@ -1,9 +1,9 @@
 #pragma once
 /// Small-strain plane-strain elasticity on the mesh of a scene: K u + M a = f(t), per metre of thickness.
 
-#include "core/body.hpp"
-#include "core/node_ops.hpp"
-#include "core/solver.hpp"
+#include "core/bodies/body.hpp"
+#include "core/loads/node_ops.hpp"
+#include "core/run/solver.hpp"
 #include "fem_reference/mesh.hpp"
 
 #include <deal.II/dofs/dof_handler.h>

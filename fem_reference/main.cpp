@@ -1,4 +1,4 @@
-#include "core/run_options.hpp"
+#include "core/run/run_options.hpp"
 #include "fem_reference/fem.hpp"
 
 /// The `testbed-fem` command: what `testbed run` becomes when the method is FEM.

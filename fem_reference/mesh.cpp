@@ -1,7 +1,7 @@
 #include "fem_reference/mesh.hpp"
 
-#include "core/body.hpp"
-#include "core/geometry.hpp"
+#include "core/bodies/body.hpp"
+#include "core/scene/geometry.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 #pragma once
 /// The lattice cells that the bodies cover, as a deal.II mesh.
 
-#include "core/grid.hpp"
-#include "core/scene.hpp"
+#include "core/lattice/grid.hpp"
+#include "core/scene/scene.hpp"
 
 #include <deal.II/grid/tria.h>
 #include <functional>

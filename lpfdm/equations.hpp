@@ -1,7 +1,7 @@
 #pragma once
 /// One step of LPFDM, a function for each group of equations of Konagai & Johansson (2000).
 
-#include "core/bin_sums.hpp"
+#include "core/bodies/bin_sums.hpp"
 #include "lpfdm/grid.hpp"
 
 #include <atomic>

@@ -1,8 +1,8 @@
 #pragma once
 /// The lattice of LPFDM with what lives on it: averages of cells, unknowns of nodes.
 
-#include "core/gather.hpp"
-#include "core/kinematics.hpp"
+#include "core/lattice/gather.hpp"
+#include "core/lattice/kinematics.hpp"
 
 namespace testbed
 {

@@ -1,9 +1,9 @@
 #include "lpfdm/lpfdm.hpp"
 
-#include "core/body_force.hpp"
-#include "core/density_scaling.hpp"
-#include "core/nonlocal.hpp"
-#include "core/tractions.hpp"
+#include "core/bodies/density_scaling.hpp"
+#include "core/bodies/nonlocal.hpp"
+#include "core/loads/body_force.hpp"
+#include "core/loads/tractions.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
 #include "lpfdm/time_step.hpp"

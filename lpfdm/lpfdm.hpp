@@ -2,7 +2,7 @@
 /// Lagrangian Particle Finite Difference Method (Konagai & Johansson 2000): points carry mass and stress, the velocity
 /// lives on the nodes of a fixed lattice, and a convection term makes up for the lattice staying where it is.
 
-#include "core/solver.hpp"
+#include "core/run/solver.hpp"
 
 #include <memory>
 

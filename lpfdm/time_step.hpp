@@ -1,8 +1,8 @@
 #pragma once
 /// What limits the time step of LPFDM.
 
-#include "core/element_system.hpp"
-#include "core/time_step.hpp"
+#include "core/run/element_system.hpp"
+#include "core/run/time_step.hpp"
 #include "lpfdm/grid.hpp"
 
 #include <cmath>

@@ -3,7 +3,7 @@
 /// it, twice to the first and minus once to the second, as a linear field asks. Within half a cell of the edge the shapes
 /// are then linear: positive, still of sum one, exact for linear fields, and the node on the edge alone counts on the edge.
 
-#include "core/grid.hpp"
+#include "core/lattice/grid.hpp"
 
 namespace testbed
 {

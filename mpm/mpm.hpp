@@ -1,7 +1,7 @@
 #pragma once
 /// Material Point Method: velocity lives on the points and is mapped to the nodes anew in each step.
 
-#include "core/solver.hpp"
+#include "core/run/solver.hpp"
 
 #include <memory>
 

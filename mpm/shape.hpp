@@ -1,8 +1,8 @@
 #pragma once
 /// Nodal shape functions as a point sees them, in one direction: values at the S nodes from the bin's first on, and slopes
-/// per cell. `a` and `width` as in core/support.hpp.
+/// per cell. `a` and `width` as in core/bodies/support.hpp.
 
-#include "core/support.hpp"
+#include "core/bodies/support.hpp"
 
 namespace testbed
 {

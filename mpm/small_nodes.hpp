@@ -5,7 +5,7 @@
 /// the share of mass that is handed over. The classical cut-off (Sulsky, Zhou & Schreyer 1995) leaves the force of the node out instead,
 /// and with it momentum.
 
-#include "core/grid.hpp"
+#include "core/lattice/grid.hpp"
 
 #include <algorithm>
 #include <cstdint>

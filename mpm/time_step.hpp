@@ -9,8 +9,8 @@
 /// Stress first and remapped velocities thus see forces smoothed twice; stress last strains with light nodes' own
 /// acceleration, and its limit goes to zero with their mass, as 2 (L/c) sqrt(xi (1 - xi) / 2) for points at xi in a cell.
 
-#include "core/element_system.hpp"
-#include "core/time_step.hpp"
+#include "core/run/element_system.hpp"
+#include "core/run/time_step.hpp"
 #include "mpm/transfer.hpp"
 
 namespace testbed

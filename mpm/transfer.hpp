@@ -2,10 +2,10 @@
 /// Particle-to-node and node-to-particle kernels of MPM. A bin's nodes are the same for all its points, so their values are
 /// loaded once and their sums are kept in registers.
 
-#include "core/bin_sums.hpp"
-#include "core/gather.hpp"
-#include "core/kinematics.hpp"
-#include "core/support.hpp"
+#include "core/bodies/bin_sums.hpp"
+#include "core/bodies/support.hpp"
+#include "core/lattice/gather.hpp"
+#include "core/lattice/kinematics.hpp"
 #include "mpm/shape.hpp"
 
 namespace testbed

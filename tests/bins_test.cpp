@@ -1,4 +1,4 @@
-#include "core/gather.hpp"
+#include "core/lattice/gather.hpp"
 #include "lpfdm/equations.hpp"
 #include "mpm/shape.hpp"
 #include "tests/random.hpp"

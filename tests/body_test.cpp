@@ -1,6 +1,6 @@
-#include "core/body.hpp"
-#include "core/geometry.hpp"
-#include "core/method_limits.hpp"
+#include "core/bodies/body.hpp"
+#include "core/scene/geometry.hpp"
+#include "core/scene/method_limits.hpp"
 #include "tests/scenes.hpp"
 
 #include <gtest/gtest.h>

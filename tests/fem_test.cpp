@@ -1,5 +1,5 @@
-#include "core/guards.hpp"
-#include "core/run.hpp"
+#include "core/run/guards.hpp"
+#include "core/run/run.hpp"
 #include "fem_reference/fem.hpp"
 
 #include <cmath>

@@ -1,9 +1,9 @@
-#include "core/guards.hpp"
+#include "core/run/guards.hpp"
 
-#include "core/balance_guards.hpp"
-#include "core/diagnosis.hpp"
-#include "core/field_guards.hpp"
-#include "core/observer.hpp"
+#include "core/run/balance_guards.hpp"
+#include "core/run/diagnosis.hpp"
+#include "core/run/field_guards.hpp"
+#include "core/run/observer.hpp"
 #include "scenes.hpp"
 #include "tests/solvers.hpp"
 

@@ -1,4 +1,5 @@
-#include "core/kinematics.hpp"
+#include "core/lattice/kinematics.hpp"
+#include "tests/polygon.hpp"
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "core/guards.hpp"
+#include "core/run/guards.hpp"
 #include "tests/scenes.hpp"
 #include "tests/solvers.hpp"
 

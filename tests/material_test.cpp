@@ -1,4 +1,4 @@
-#include "core/make_material.hpp"
+#include "core/materials/make_material.hpp"
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 /// The one-step map of small bodies: what is known of it must be found.
 
-#include "core/spectrum.hpp"
+#include "core/run/spectrum.hpp"
 #include "tests/scenes.hpp"
 #include "tests/solvers.hpp"
 

@@ -1,6 +1,6 @@
-#include "core/body.hpp"
-#include "core/node_ops.hpp"
-#include "core/solver.hpp"
+#include "core/bodies/body.hpp"
+#include "core/loads/node_ops.hpp"
+#include "core/run/solver.hpp"
 #include "tests/scenes.hpp"
 
 #include <gtest/gtest.h>

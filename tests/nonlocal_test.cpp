@@ -1,4 +1,4 @@
-#include "core/nonlocal.hpp"
+#include "core/bodies/nonlocal.hpp"
 #include "mpm/shape.hpp"
 #include "tests/scenes.hpp"
 

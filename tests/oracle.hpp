@@ -1,8 +1,8 @@
 #pragma once
 /// Compares a solver with its oracle, point by point.
 
-#include "core/geometry.hpp"
-#include "core/solver.hpp"
+#include "core/run/solver.hpp"
+#include "core/scene/geometry.hpp"
 #include "tests/reference_kernels.hpp"
 #include "tests/scenes.hpp"
 

@@ -1,5 +1,5 @@
-#include "core/point_driver.hpp"
-#include "core/scene.hpp"
+#include "core/run/point_driver.hpp"
+#include "core/scene/scene.hpp"
 #include "tests/scenes.hpp"
 
 #include <cmath>

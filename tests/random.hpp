@@ -1,8 +1,8 @@
 #pragma once
 /// Reproducible random input for tests.
 
-#include "core/points.hpp"
-#include "core/types.hpp"
+#include "core/base/types.hpp"
+#include "core/lattice/points.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
-#include "core/body.hpp"
-#include "core/geometry.hpp"
-#include "core/random_field.hpp"
+#include "core/bodies/body.hpp"
+#include "core/bodies/random_field.hpp"
+#include "core/scene/geometry.hpp"
 #include "tests/scenes.hpp"
 
 #include <gtest/gtest.h>

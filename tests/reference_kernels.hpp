@@ -2,7 +2,7 @@
 /// Slow and obvious forms of LPFDM and MPM, written from the equations with plain loops over points, cells and nodes: the
 /// oracles of the fast kernels. They share nothing with them but the input.
 
-#include "core/types.hpp"
+#include "core/base/types.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 /// Scenes that nobody would write: each is refused in words that name the key, before anything is computed.
 
-#include "core/scene.hpp"
-#include "core/scene_trial.hpp"
-#include "core/shown.hpp"
+#include "core/base/shown.hpp"
+#include "core/scene/scene.hpp"
+#include "core/scene/trial.hpp"
 #include "tests/scenes.hpp"
 
 #include <algorithm>

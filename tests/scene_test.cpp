@@ -1,4 +1,4 @@
-#include "core/scene.hpp"
+#include "core/scene/scene.hpp"
 #include "tests/scenes.hpp"
 
 #include <gtest/gtest.h>

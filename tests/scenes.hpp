@@ -1,7 +1,7 @@
 #pragma once
 /// Scenes made in tests, written to a file and loaded as a user's would be.
 
-#include "core/scene.hpp"
+#include "core/scene/scene.hpp"
 
 #include <atomic>
 #include <filesystem>

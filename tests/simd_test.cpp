@@ -1,4 +1,4 @@
-#include "core/simd.hpp"
+#include "core/base/simd.hpp"
 
 #include "tests/random.hpp"
 

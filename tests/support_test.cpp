@@ -1,4 +1,4 @@
-#include "core/support.hpp"
+#include "core/bodies/support.hpp"
 #include "mpm/shape.hpp"
 #include "tests/random.hpp"
 

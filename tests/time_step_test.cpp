@@ -1,8 +1,8 @@
 /// Limits of the time step: what each method says against what its steps do; steps of changing length; density scaling.
 
-#include "core/method_limits.hpp"
-#include "core/observer.hpp"
-#include "core/step_control.hpp"
+#include "core/run/observer.hpp"
+#include "core/run/step_control.hpp"
+#include "core/scene/method_limits.hpp"
 #include "tests/scenes.hpp"
 #include "tests/solvers.hpp"
 

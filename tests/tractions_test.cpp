@@ -1,4 +1,4 @@
-#include "core/tractions.hpp"
+#include "core/loads/tractions.hpp"
 #include "tests/scenes.hpp"
 
 #include <gtest/gtest.h>

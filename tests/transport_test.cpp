@@ -1,7 +1,7 @@
 /// Transport of LPFDM: free faces, the middle of the step, and what both mean for whole bodies. `old` is the form before it: central
 /// convection of the whole step at once, positions from the start of the step.
 
-#include "core/point_sums.hpp"
+#include "core/bodies/point_sums.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
 #include "lpfdm/lpfdm.hpp"

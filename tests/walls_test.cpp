@@ -1,7 +1,9 @@
-#include "core/node_ops.hpp"
+#include "core/bodies/body.hpp"
+#include "core/loads/node_ops.hpp"
 #include "tests/scenes.hpp"
 
 #include <gtest/gtest.h>
+#include <numeric>
 
 using namespace testbed;
 

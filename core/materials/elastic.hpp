@@ -3,9 +3,10 @@
 /// first order (`hypoelastic_jaumann`) or exact (`hypoelastic_exact_rotation`). The out-of-plane stress needs no storage:
 /// sigma_zz = nu (sigma_xx + sigma_yy) for all three.
 
-#include "core/points.hpp"
-#include "core/types.hpp"
+#include "core/base/types.hpp"
+#include "core/lattice/points.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace testbed
@@ -31,6 +32,18 @@ public:
 private:
     double youngs_modulus_ = 0, poissons_ratio_ = 0, shear_ = 0, lame_ = 0;
 };
+
+/// Largest ratio of eps : D : eps over |grad u|^2, by which no cell is stiffer: 2 (lambda + mu) of in-plane dilatation, or 2 mu of shear
+/// where Poisson's ratio is negative [Pa].
+inline double gradient_stiffness(const ElasticModuli& m)
+{
+    return 2 * m.shear() + 2 * std::max(m.lame(), 0.0);
+}
+/// Young's modulus of point p over that of its body's material.
+inline double stiffness_ratio(const Points& q, std::size_t p)
+{
+    return q.stiffness.active() ? q.stiffness[p] : 1.0;
+}
 
 /// Out-of-plane stress of point p [Pa]: that of the law, if it keeps one, else the elastic one.
 inline double out_of_plane_stress(const ElasticModuli& m, const Points& q, std::size_t p)

@@ -2,7 +2,7 @@
 /// Share of the cohesion that is left after a plastic shear strain: max(residual, 1 - slope strain). A drop at first yield is
 /// an infinite slope, no softening a slope of zero.
 
-#include "core/simd.hpp"
+#include "core/base/simd.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 /// Text of expressions: parsed or refused in words, and evaluated.
 
-#include "core/expression.hpp"
+#include "core/scene/expression.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 using namespace testbed;

@@ -1,7 +1,7 @@
 /// Path files of `testbed point`: refused in words, or driven to an answer of finite numbers.
 
-#include "core/point_driver.hpp"
-#include "core/scene.hpp"
+#include "core/run/point_driver.hpp"
+#include "core/scene/scene.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 using namespace testbed;

@@ -1,9 +1,10 @@
 /// Text of scenes: refused in words, or right: then its expressions are tried, its bodies and its supports made, and the resolved scene
 /// is TOML.
 
-#include "core/node_ops.hpp"
-#include "core/scene_reader.hpp"
-#include "core/scene_trial.hpp"
+#include "core/bodies/body.hpp"
+#include "core/loads/node_ops.hpp"
+#include "core/scene/reader.hpp"
+#include "core/scene/trial.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 using namespace testbed;

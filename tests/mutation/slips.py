@@ -81,5 +81,5 @@ def put_in(slips, root):
             own = places[begin, end]
             text = text[:begin] + (_python if file.endswith(".py") else _cpp)(own[0].of, own) + text[end:]
         if file.endswith(".py"):
-            text = re.sub(r"^(?=import |from )", "from ._slip import is_on as _slip\n", text, count=1, flags=re.M)
+            text = re.sub(r"^(?=import |from )", "from testbed_reports._slip import is_on as _slip\n", text, count=1, flags=re.M)
         path.write_text(text, encoding="utf-8")

@@ -14,7 +14,7 @@ sys.path[:0] = [str(REPORTS), str(HERE)]
 def make(tmp_path):
     """make(name='result.h5', **changes) -> an opened synthetic result."""
     from synthetic import write_result
-    from testbed_reports.results import Result
+    from testbed_reports.read.results import Result
 
     def build(name="result.h5", **changes):
         return Result(write_result(tmp_path / name, **changes))

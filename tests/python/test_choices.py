@@ -4,14 +4,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from synthetic import write_study
-from testbed_reports import components, failures, matrix, tables
-from testbed_reports.bisection import Bisection, next_values
-from testbed_reports.dataset import read_study_folder
-from testbed_reports.figures import draw
-from testbed_reports.search import Searches
-from testbed_reports.style import Style
-from testbed_reports.values import same
-from testbed_reports.work_precision import reach
+from testbed_reports.grade import components
+from testbed_reports.page import failures, tables
+from testbed_reports.draw import matrix
+from testbed_reports.read.bisection import Bisection, next_values
+from testbed_reports.grade.dataset import read_study_folder
+from testbed_reports.draw.figures import draw
+from testbed_reports.study.search import Searches
+from testbed_reports.draw.style import Style
+from testbed_reports.read.values import same
+from testbed_reports.draw.work_precision import reach
 
 FIGURE = """
 [[figure]]

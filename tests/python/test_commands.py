@@ -12,8 +12,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 TESTBED = Path(os.environ.get("TESTBED") or ROOT / "build" / "bin" / "testbed")
-COLUMN = str(ROOT / "benchmarks" / "elastic_column" / "scene.toml")
-SPEED = str(ROOT / "benchmarks" / "speed" / "scene.toml")
+COLUMN = str(ROOT / "benchmarks" / "elastic" / "elastic_column" / "scene.toml")
+SPEED = str(ROOT / "benchmarks" / "elastic" / "speed" / "scene.toml")
 FEM = TESTBED.with_name("testbed-fem").exists()
 
 
@@ -121,7 +121,7 @@ def test_pipes_and_devices_are_not_replaced(tmp_path):
         os.mkfifo(tmp_path / name)
     done = run("run", COLUMN, "-o", tmp_path / "r.h5")
     assert done.returncode == 1 and "is no file" in done.stderr
-    law = str(ROOT / "benchmarks" / "laws" / "mohr_coulomb.toml")
+    law = str(ROOT / "benchmarks" / "soil" / "laws" / "mohr_coulomb.toml")
     read = subprocess.Popen(["cat", tmp_path / "stress.csv"], stdout=subprocess.PIPE)
     assert run("point", law, "-o", tmp_path / "stress.csv").returncode == 0
     assert read.communicate(timeout=20)[0].decode() == run("point", law).stdout
@@ -171,9 +171,9 @@ def test_time_limit(tmp_path):
         assert file.attrs["status"] == "time_limit"
 
 
-SUDDEN = str(ROOT / "benchmarks" / "elastic_column_sudden" / "scene.toml")
-FLIGHT = str(ROOT / "benchmarks" / "free_flight" / "scene.toml")
-DISK = str(ROOT / "benchmarks" / "rotating_disk" / "scene.toml")
+SUDDEN = str(ROOT / "benchmarks" / "elastic" / "elastic_column_sudden" / "scene.toml")
+FLIGHT = str(ROOT / "benchmarks" / "manufactured" / "free_flight" / "scene.toml")
+DISK = str(ROOT / "benchmarks" / "manufactured" / "rotating_disk" / "scene.toml")
 
 
 @pytest.mark.parametrize("method", ["lpfdm", "lpfdm-2000", "mpm-linear", "mpm-cpgimp"])

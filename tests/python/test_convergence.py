@@ -1,7 +1,7 @@
 """Orders of convergence."""
 import numpy as np
 import pytest
-from testbed_reports.convergence import fit_order, fit_power, pairwise_orders
+from testbed_reports.grade.convergence import fit_order, fit_power, pairwise_orders
 
 L = np.array([2.0, 1.0, 0.5, 0.25])
 

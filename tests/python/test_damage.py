@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from damage import damaged_copies
 from synthetic import seal, write_result, write_study
-from testbed_reports import guarded
-from testbed_reports.dataset import read_run, read_study_folder
-from testbed_reports.report import main as report
-from testbed_reports.results import Result, ResultError
+from testbed_reports.read import guarded
+from testbed_reports.grade.dataset import read_run, read_study_folder
+from testbed_reports.page.report import main as report
+from testbed_reports.read.results import Result, ResultError
 
 COUNT = int(os.environ.get("DAMAGED", "200"))
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from synthetic import write_result, write_study
-from testbed_reports.dataset import metrics_csv, read_study_folder
-from testbed_reports.report import build
-from testbed_reports.results import Result
+from testbed_reports.grade.dataset import metrics_csv, read_study_folder
+from testbed_reports.page.report import build
+from testbed_reports.read.results import Result
 
 ROOT = Path(__file__).resolve().parents[2]
 TESTBED = Path(os.environ.get("TESTBED") or ROOT / "build" / "bin" / "testbed")
-COLUMN = str(ROOT / "benchmarks" / "elastic_column" / "scene.toml")
-SUDDEN = str(ROOT / "benchmarks" / "elastic_column_sudden" / "scene.toml")
+COLUMN = str(ROOT / "benchmarks" / "elastic" / "elastic_column" / "scene.toml")
+SUDDEN = str(ROOT / "benchmarks" / "elastic" / "elastic_column_sudden" / "scene.toml")
 FEM = TESTBED.with_name("testbed-fem").exists()
 
 SERIES = ("kinetic_energy_points", "plastic_dissipation", "damping_dissipation", "hourglass_dissipation", "external_work",

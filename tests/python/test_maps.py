@@ -5,11 +5,11 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 from synthetic_soil import lattice, vectors, write_soil_study
-from testbed_reports.dataset import read_study_folder
-from testbed_reports.drawing import FigureError
-from testbed_reports.figures import draw
-from testbed_reports.maps import INCLUSION, _stripe
-from testbed_reports.style import Style
+from testbed_reports.grade.dataset import read_study_folder
+from testbed_reports.draw.drawing import FigureError
+from testbed_reports.draw.figures import draw
+from testbed_reports.draw.maps import INCLUSION, _stripe
+from testbed_reports.draw.style import Style
 
 WALL = '[[wall]]\nname = "cap"\nmin = [-1.0, 2.0]\nmax = [3.0, 2.5]\n'
 X, H = lattice(1.0, 2.0, 0.1), 0.1

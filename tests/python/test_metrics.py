@@ -5,8 +5,8 @@ import h5py
 import numpy as np
 import pytest
 from synthetic import H, PERIOD, TIP, write_result
-from testbed_reports import metrics
-from testbed_reports.results import Result, ResultError
+from testbed_reports.grade import metrics
+from testbed_reports.read.results import Result, ResultError
 
 
 def rows(result):

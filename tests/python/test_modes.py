@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from testbed_reports import modes
+from testbed_reports.draw import modes
 
 ROOT = Path(__file__).resolve().parents[2]
 TESTBED = Path(os.environ.get("TESTBED") or ROOT / "build" / "bin" / "testbed")

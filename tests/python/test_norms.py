@@ -1,7 +1,7 @@
 """Norms against values worked out by hand."""
 import numpy as np
 import pytest
-from testbed_reports import norms
+from testbed_reports.grade import norms
 
 S = np.zeros((2, 6))
 S[0, [0, 1, 3]] = 3.0, 2.0, 4.0

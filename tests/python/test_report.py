@@ -9,11 +9,12 @@ from html.parser import HTMLParser
 import pytest
 from conftest import REPORTS
 from synthetic import write_result, write_study
-from testbed_reports.dataset import read_study_folder
-from testbed_reports.figures import draw
-from testbed_reports.report import build
-from testbed_reports.style import Style
-from testbed_reports.tables import Table, as_latex, convergence_table, escape, performance_table, power_law_table, study_tables
+from testbed_reports.grade.dataset import read_study_folder
+from testbed_reports.draw.figures import draw
+from testbed_reports.page.report import build
+from testbed_reports.draw.style import Style
+from testbed_reports.draw.table import Table, as_latex, escape
+from testbed_reports.page.tables import convergence_table, performance_table, power_law_table, study_tables
 
 EXTRA = """
 [[target]]

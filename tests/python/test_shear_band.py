@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 from synthetic_soil import lattice
-from testbed_reports.shear_band import ESTIMATORS, Band, estimate_widths, find_bands, half_max_width, widths
+from testbed_reports.grade.shear_band import ESTIMATORS, Band, estimate_widths, find_bands, half_max_width, widths
 
 SHAPES = {"uniform": lambda d, w: (np.abs(d) < w / 2) * 1.0,
           "cosine": lambda d, w: np.where(np.abs(d) < w / 2, 0.5 * (1.0 + np.cos(2.0 * np.pi * d / w)), 0.0),

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from test_commands import FEM, ROOT, TESTBED, datasets
-from testbed_reports import metrics
-from testbed_reports.results import Result
+from testbed_reports.grade import metrics
+from testbed_reports.read.results import Result
 
 PARTICLES = ["lpfdm-2000", "lpfdm", "mpm-linear", "mpm-linear-bbar", "mpm-cpgimp"]
 NOT_LOCKING = ["lpfdm-2000", "lpfdm", "mpm-linear-bbar"]
@@ -18,7 +18,7 @@ def run(tmp_path, case, method, *sets, code=0):
     """The result of a case, and what was said."""
     path = tmp_path / "r.h5"
     arguments = [a for s in sets for a in ("--set", s)]
-    done = subprocess.run([str(TESTBED), "run", str(ROOT / "benchmarks" / case / "scene.toml"), "--method", method, *arguments, "-o", str(path)],
+    done = subprocess.run([str(TESTBED), "run", str(ROOT / "benchmarks" / "soil" / case / "scene.toml"), "--method", method, *arguments, "-o", str(path)],
                           capture_output=True, text=True, timeout=300)
     assert done.returncode == code, done.stderr
     return (Result(path) if path.exists() else None), done.stderr
@@ -112,7 +112,7 @@ def test_the_same_soil_for_every_method(tmp_path):
     ("psc_band_nonlocal", "lpfdm", ["time.end=0.1"]), ("psc_band_nonlocal", "mpm-linear", ["time.end=0.1"])])
 def test_same_bits_for_one_and_two_threads(tmp_path, case, method, settings):
     """On lattices large enough to be shared out between threads."""
-    path = str(ROOT / "benchmarks" / case / "scene.toml")
+    path = str(ROOT / "benchmarks" / "soil" / case / "scene.toml")
     settings = [word for setting in settings for word in ("--set", setting)]
     for threads in (1, 2):
         done = subprocess.run([str(TESTBED), "run", path, "--method", method, *settings, "--threads", str(threads), "-o",
@@ -145,7 +145,7 @@ def test_bad_scenes_are_refused(tmp_path, case, change, message):
 
 
 def test_point_driver(tmp_path):
-    law = str(ROOT / "benchmarks" / "laws" / "mohr_coulomb.toml")
+    law = str(ROOT / "benchmarks" / "soil" / "laws" / "mohr_coulomb.toml")
     done = subprocess.run([str(TESTBED), "point", law], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and not done.stderr
     table = np.genfromtxt(done.stdout.splitlines(), delimiter=",", names=True)

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from synthetic_soil import lattice, toml_curves, vectors, write_soil
-from testbed_reports import metrics, soil_metrics
-from testbed_reports.results import Result
+from testbed_reports.grade import metrics, soil_metrics
+from testbed_reports.read.results import Result
 
 SQUARE = lattice(1.0, 1.0, 0.25)
 

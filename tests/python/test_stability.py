@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from synthetic import write_result
 from test_study import Bench
-from testbed_reports.bisection import Bisection, bracket, next_values, problem_of
-from testbed_reports.dataset import read_study_folder
-from testbed_reports.failures import cheapest, costs
-from testbed_reports.limits import find_limits
-from testbed_reports.matrix import build as build_matrices
-from testbed_reports.metrics import grade
-from testbed_reports.report import build
-from testbed_reports.results import Result
-from testbed_reports.study_file import StudyError, read_study
+from testbed_reports.read.bisection import Bisection, bracket, next_values, problem_of
+from testbed_reports.grade.dataset import read_study_folder
+from testbed_reports.page.failures import cheapest, costs
+from testbed_reports.grade.limits import find_limits
+from testbed_reports.draw.matrix import build as build_matrices
+from testbed_reports.grade.metrics import grade
+from testbed_reports.page.report import build
+from testbed_reports.read.results import Result
+from testbed_reports.read.study_file import StudyError, read_study
 
 
 def search_all(search, threshold):

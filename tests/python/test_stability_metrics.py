@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from testbed_reports import stability_metrics as sm
-from testbed_reports import verdicts
+from testbed_reports.grade import stability_metrics as sm
+from testbed_reports.grade import verdicts
 
 
 class Snapshot(dict):

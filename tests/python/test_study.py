@@ -251,8 +251,9 @@ value = 1.0
 
 def test_a_seed_is_known_before_the_run(tmp_path, monkeypatch):
     """A run that is lost keeps its seed, and seeds make no lines of their own."""
-    from testbed_reports import dataset, study
-    from testbed_reports.study_file import read_study
+    from testbed_reports.grade import dataset
+    from testbed_reports.study import study
+    from testbed_reports.read.study_file import read_study
     bench = Bench(tmp_path)
     bench.write('title = "A"\nscene = "scene.toml"\n[axes]\n"material.soil.random.seed" = [0, 3]\n')
     monkeypatch.setattr(study, "resolve", lambda _, c: (

@@ -3,7 +3,7 @@ import subprocess
 from conftest import REPORTS
 
 import pytest
-from testbed_reports.study_file import StudyError, flatten, read_study, toml_value
+from testbed_reports.read.study_file import StudyError, flatten, read_study, toml_value
 
 BASE = 'title = "A"\nscene = "scene.toml"\n'
 AXES = '[axes]\nmethod = ["a", "b", "fem-q2"]\n"grid.cell_size" = [1.0, 0.5]\n'

@@ -1,8 +1,8 @@
 """Each kind of target, passing and failing."""
 import pytest
 from synthetic import write_study
-from testbed_reports.dataset import read_study_folder
-from testbed_reports.targets import as_text, judge, number
+from testbed_reports.grade.dataset import read_study_folder
+from testbed_reports.grade.targets import as_text, judge, number
 
 
 @pytest.fixture(scope="module")

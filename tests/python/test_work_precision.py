@@ -3,10 +3,10 @@ from types import SimpleNamespace
 
 import pytest
 from synthetic import write_study
-from testbed_reports import bench
-from testbed_reports.dataset import read_study_folder
-from testbed_reports.report import build
-from testbed_reports.work_precision import Cost, cheapest, costs_of, error_of, front, reach
+from testbed_reports.page import bench
+from testbed_reports.grade.dataset import read_study_folder
+from testbed_reports.page.report import build
+from testbed_reports.draw.work_precision import Cost, cheapest, costs_of, error_of, front, reach
 
 FIGURES = """
 [[figure]]

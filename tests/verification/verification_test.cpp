@@ -1,9 +1,9 @@
 /// Verification cases at coarse levels: purpose, source and expected value stand with each. The same scenes at all levels are the
 /// studies in benchmarks/studies.
 
-#include "core/method_limits.hpp"
-#include "core/observer.hpp"
-#include "core/run.hpp"
+#include "core/run/observer.hpp"
+#include "core/run/run.hpp"
+#include "core/scene/method_limits.hpp"
 #include "tests/scenes.hpp"
 #include "tests/solvers.hpp"
 
@@ -94,7 +94,7 @@ TEST(SingleCell, UniaxialStress)
 {
     for (const auto& method : particle_methods)
     {
-        const Errors e = errors(run("single_cell", method));
+        const Errors e = errors(run("elastic/single_cell", method));
         EXPECT_LT(e.stress_l2, 5e-8) << method;
         EXPECT_LT(e.displacement_l2, 1e-6) << method;
     }
@@ -106,7 +106,7 @@ TEST(Column, StressError)
     for (const auto& method : particle_methods)
         for (const double L : {2.0, 1.0})
         {
-            const Errors e = errors(run("elastic_column", method, {"grid.cell_size=" + std::to_string(L)}));
+            const Errors e = errors(run("elastic/elastic_column", method, {"grid.cell_size=" + std::to_string(L)}));
             EXPECT_NEAR(e.stress_l2, std::sqrt(10.0 / 128) * L / 10 * std::sqrt(3), 4e-4) << method;
             EXPECT_LT(e.displacement_l2, 0.0026 * L * L) << method;
         }
@@ -121,7 +121,8 @@ TEST(Column, QuadraticBSplines)
         double before = 0;
         for (const double L : {2.0, 1.0})
         {
-            const Outcome state = run("elastic_column", "mpm-bspline", {"grid.cell_size=" + std::to_string(L), "mpm.scheme=" + scheme});
+            const Outcome state =
+                run("elastic/elastic_column", "mpm-bspline", {"grid.cell_size=" + std::to_string(L), "mpm.scheme=" + scheme});
             const Errors e = errors(state);
             EXPECT_LT(e.stress_l2, 0.008 * std::pow(L, 1.5)) << scheme;
             EXPECT_LT(e.displacement_l2, 0.003 * L * L) << scheme;
@@ -137,8 +138,8 @@ TEST(LargeColumn, DomainsConverge)
 {
     for (const std::string method : {"lpfdm", "mpm-cpgimp"})
     {
-        const double coarse = errors(run("elastic_column_large", method, {"grid.cell_size=6.25"})).stress_l1;
-        const double fine = errors(run("elastic_column_large", method, {"grid.cell_size=1.5625"})).stress_l1;
+        const double coarse = errors(run("elastic/elastic_column_large", method, {"grid.cell_size=6.25"})).stress_l1;
+        const double fine = errors(run("elastic/elastic_column_large", method, {"grid.cell_size=1.5625"})).stress_l1;
         EXPECT_NEAR(coarse, 0.0255, 0.001) << method;
         EXPECT_NEAR(fine, 0.0024, 0.0002) << method;
         EXPECT_GT(std::log2(coarse / fine) / 2, 1.6) << method;
@@ -149,8 +150,8 @@ TEST(LargeColumn, DomainsConverge)
 TEST(LargeColumn, PointsDoNotConverge)
 {
     for (const std::string method : {"lpfdm-2000", "mpm-linear"})
-        EXPECT_GT(errors(run("elastic_column_large", method, {"grid.cell_size=1.5625"})).stress_l1,
-                  errors(run("elastic_column_large", method, {"grid.cell_size=6.25"})).stress_l1)
+        EXPECT_GT(errors(run("elastic/elastic_column_large", method, {"grid.cell_size=1.5625"})).stress_l1,
+                  errors(run("elastic/elastic_column_large", method, {"grid.cell_size=6.25"})).stress_l1)
             << method;
 }
 
@@ -160,7 +161,7 @@ TEST(SuddenColumn, FirstPeak)
     for (const auto& method : particle_methods)
     {
         double peak = 0, time = 0, static_tip = 0;
-        run("elastic_column_sudden", method, {"time.end=H*3/c"},
+        run("elastic/elastic_column_sudden", method, {"time.end=H*3/c"},
             [&](const Outcome& s)
             {
                 const Points& q = s.solver->bodies()[0].points;
@@ -188,7 +189,7 @@ TEST(FreeFlight, MomentumAndNoStress)
     for (const auto& method : particle_methods)
     {
         Vec2 start{0, 0};
-        const Outcome s = run("free_flight", method, {"constants.ppc=2"},
+        const Outcome s = run("manufactured/free_flight", method, {"constants.ppc=2"},
                               [&](const Outcome& now)
                               {
                                   if (now.t == 0)
@@ -319,7 +320,7 @@ TEST(EmptyLattice, HoldsASingleCell)
 TEST(FreeFlight, LiteralFrontierLosesMomentum)
 {
     double start = 0;
-    const Outcome s = run("free_flight", "lpfdm-2000", {"lpfdm.frontier=literal"},
+    const Outcome s = run("manufactured/free_flight", "lpfdm-2000", {"lpfdm.frontier=literal"},
                           [&](const Outcome& now)
                           {
                               if (now.t == 0)
@@ -334,7 +335,7 @@ TEST(RotatingDisk, AngularMomentumAndEnergy)
     for (const std::string method : {"lpfdm-2000", "lpfdm"})
     {
         double start = 0, energy = 0, most = 0;
-        const Outcome s = run("rotating_disk", method, {},
+        const Outcome s = run("manufactured/rotating_disk", method, {},
                               [&](const Outcome& now)
                               {
                                   const MotionSums sums = now.solver->sums();
@@ -358,7 +359,7 @@ TEST(RotatingDisk, FewPoints)
     double angular = 0, energy = 0;
     const auto total = [](const Outcome& now)
     { return now.solver->sums().kinetic_energy * (1 + 1 / Observer::kinetic_ratio(*now.solver)); };
-    const Outcome s = run("rotating_disk", "lpfdm", {"constants.ppc=2"},
+    const Outcome s = run("manufactured/rotating_disk", "lpfdm", {"constants.ppc=2"},
                           [&](const Outcome& now)
                           {
                               if (now.t == 0)
@@ -375,7 +376,7 @@ TEST(RotatingDisk, FewPoints)
 TEST(BodyForce, SecondOrder)
 {
     const auto error = [](double L) {
-        return errors(run("axis_aligned", "lpfdm", {fmt::format("grid.cell_size={}", L), "time.cfl=0.4"})).displacement_l2;
+        return errors(run("manufactured/axis_aligned", "lpfdm", {fmt::format("grid.cell_size={}", L), "time.cfl=0.4"})).displacement_l2;
     };
     const double coarse = error(1.0 / 16), fine = error(1.0 / 32);
     EXPECT_GT(std::log2(coarse / fine), 1.9) << coarse << " " << fine;
@@ -388,7 +389,7 @@ TEST(BodyForce, AxisAlignedManufacturedSolution)
     for (const auto& method : {"lpfdm", "mpm-cpgimp"})
     {
         const auto error = [&](double L)
-        { return errors(run("axis_aligned", method, {"grid.cell_size=" + std::to_string(L)})).displacement_l2; };
+        { return errors(run("manufactured/axis_aligned", method, {"grid.cell_size=" + std::to_string(L)})).displacement_l2; };
         const double coarse = error(0.125), fine = error(0.0625);
         EXPECT_LT(fine, 0.02) << method;
         EXPECT_GT(std::log2(coarse / fine), 1.5) << method;

@@ -1,0 +1,264 @@
+#include "benchmarks/harness/bench.hpp"
+#include "benchmarks/harness/modes.hpp"
+#include "core/base/provenance.hpp"
+#include "core/run/observer.hpp"
+#include "core/run/point_driver.hpp"
+#include "core/run/results.hpp"
+#include "core/run/run.hpp"
+#include "core/run/run_options.hpp"
+#include "core/run/step_control.hpp"
+#include "core/scene/geometry.hpp"
+#include "core/scene/method_limits.hpp"
+#include "lpfdm/lpfdm.hpp"
+#include "mpm/mpm.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <unistd.h>
+
+/// The `testbed` command.
+namespace testbed
+{
+namespace
+{
+std::filesystem::path own_directory()
+{
+    return std::filesystem::read_symlink("/proc/self/exe").parent_path();
+}
+
+/// Replaces this process by `program`, looked for beside this executable and then on PATH, with the same arguments.
+[[noreturn]] void become(const std::string& program, std::vector<std::string> arguments)
+{
+    const auto self = std::filesystem::read_symlink("/proc/self/exe");
+    ::setenv("TESTBED", self.c_str(), 0);
+    const auto beside = own_directory() / program;
+    arguments.insert(arguments.begin(), program);
+    std::vector<char*> argv;
+    for (auto& a : arguments)
+        argv.push_back(a.data());
+    argv.push_back(nullptr);
+    std::cout.flush();
+    if (std::filesystem::exists(beside))
+        ::execv(beside.c_str(), argv.data());
+    ::execvp(program.c_str(), argv.data());
+    throw SceneError(fmt::format("'{}' is not built or not installed ({}); the FEM reference needs deal.II, study and report need Python",
+                                 program, std::strerror(errno)));
+}
+
+std::unique_ptr<Solver> make_particle_solver(const Scene& scene)
+{
+    return family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene);
+}
+
+std::string fields_and_modules(const Scene& scene, Solver& solver)
+{
+    std::vector<std::string> fields, modules{name_of(family_of(scene))};
+    for (const Body& body : solver.bodies())
+        body.points.for_each_field(
+            [&](const auto& f)
+            {
+                if (std::find(fields.begin(), fields.end(), f.name()) == fields.end())
+                    fields.emplace_back(f.name());
+            });
+    if (scene.gravity)
+        modules.emplace_back("gravity");
+    if (scene.damping)
+        modules.emplace_back("local damping");
+    if (!scene.boundaries.empty())
+        modules.push_back(fmt::format("{} fixities", scene.boundaries.size()));
+    if (!scene.walls.empty())
+        modules.push_back(fmt::format("{} walls", scene.walls.size()));
+    if (!scene.tractions.empty())
+        modules.push_back(fmt::format("{} tractions", scene.tractions.size()));
+    if (scene.body_force)
+        modules.emplace_back("body force expression");
+    if (!scene.probes.empty())
+        modules.push_back(fmt::format("{} probes", scene.probes.size()));
+    if (scene.exact.count(solver.kinematics()))
+        modules.push_back(fmt::format("exact solution ({})", solver.kinematics()));
+    return fmt::format("fields           {}\nmodules          {}\n", fmt::join(fields, ", "), fmt::join(modules, ", "));
+}
+
+/// What a run does before its first step. @throws SceneError where it would fail
+void try_first_sample(const Scene& scene, Solver& solver)
+{
+    try
+    {
+        solver.prepare(0, time_step(scene, solver));
+        solver.update_points();
+        Observer(scene, solver).sample(0, time_step(scene));
+    }
+    catch (const Diverged& e)
+    {
+        throw SceneError(fmt::format("{}: at the start: {}", scene.path, e.what()));
+    }
+}
+
+void check(const RunOptions& options, bool resolved)
+{
+    const Scene scene = load_and_warn(options);
+    if (resolved)
+    {
+        fmt::print("{}", resolved_toml(scene));
+        return;
+    }
+    const bool is_fem = family_of(scene) == Family::fem;
+    fmt::print("scene            {}\nmethod           {}\n", scene.path, variant_label(scene));
+    fmt::print("lattice          {:.0f} x {:.0f} cells of {} m\n", scene.grid.size[0] / scene.grid.cell_size,
+               scene.grid.size[1] / scene.grid.cell_size, scene.grid.cell_size);
+    for (const MaterialSpec& m : scene.materials)
+    {
+        const ElasticModuli moduli(largest_youngs_modulus(scene, m), m.poissons_ratio);
+        fmt::print("material {:<7} {}, M = {:.5g} Pa, c_p = {:.5g} m/s, c_s = {:.5g} m/s\n", m.name, name_of(m.law), moduli.constrained(),
+                   std::sqrt(moduli.constrained() / m.density), std::sqrt(moduli.shear() / m.density));
+    }
+    std::size_t points = 0;
+    for (const BodySpec& body : scene.bodies)
+        points += fill(scene, body).size();
+    fmt::print("points           {}\n", points);
+    if (is_fem)
+    {
+        fmt::print("time step        {:.5g} s, critical {:.5g} s, {:.0f} steps\n", time_step(scene), critical_time_step(scene),
+                   std::ceil(scene.time.end / time_step(scene)));
+        fmt::print("the FEM reference samples its solution at these points; it keeps no particle fields\n");
+        return;
+    }
+    const std::unique_ptr<Solver> solver = make_particle_solver(scene);
+    if (const std::string warning = step_warning(scene, *solver); !warning.empty())
+        warn(options, warning);
+    const double dt = time_step(scene, *solver);
+    fmt::print("time step        {:.5g} s{}, {}{:.0f} steps\nlimits           {}\n", dt,
+               scene.time.follows_limit ? " at the start, then as the limit lets it" : "", scene.time.follows_limit ? "about " : "",
+               std::ceil(scene.time.end / dt), description(solver->step_limits()));
+    if (const auto sharp = solver->sharp_step_limit())
+        fmt::print("sharp limit      {:.5g} s of stiffness, for the points as they stand at the start\n", *sharp);
+    try_first_sample(scene, *solver);
+    fmt::print("cells in use     {}\nunknowns         {}\n{}", solver->active_cells(), solver->unknowns(),
+               fields_and_modules(scene, *solver));
+    fmt::print("bytes per point  {:.1f} (all arrays, {:.3g} MB)\n", static_cast<double>(solver->bytes()) / static_cast<double>(points),
+               1e-6 * static_cast<double>(solver->bytes()));
+}
+
+void list()
+{
+    fmt::print("methods (for `method` in a scene, or --method)\n");
+    for (const Variant& v : variants())
+        fmt::print("  {:<16} {}\n", v.name, v.description);
+    fmt::print("laws (for `law` of a material)\n");
+    for (const std::string& law : names_of<MaterialSpec::Law>())
+        fmt::print("  {}\n", law);
+}
+
+std::vector<std::string> rest_of(int argc, char** argv, int from)
+{
+    return {argv + std::min(from, argc), argv + argc};
+}
+
+int run(int argc, char** argv)
+{
+    // study and report are programs of their own, found the way git finds its subcommands
+    if (argc > 1 && (std::string(argv[1]) == "study" || std::string(argv[1]) == "report"))
+        become(std::string("testbed-") + argv[1], rest_of(argc, argv, 2));
+
+    CLI::App app("Verification and research testbed: LPFDM, MPM and FEM for large soil deformation");
+    app.require_subcommand(1);
+    app.set_version_flag("--version", build().commit);
+    RunOptions options;
+    bool resolved = false;
+    std::string table;
+    CLI::App* run_command = app.add_subcommand("run", "run a scene and write a result file");
+    add_run_options(*run_command, options);
+    CLI::App* check_command = app.add_subcommand("check", "parse a scene and say what it would use");
+    add_scene_options(*check_command, options);
+    check_command->add_flag("--resolved", resolved, "print the scene with all its defaults, as TOML");
+    std::string law, csv;
+    CLI::App* point_command = app.add_subcommand("point", "drive a law alone along a strain path; CSV on stdout");
+    point_command->add_option("law", law, "path file (TOML)")->required();
+    point_command->add_option("-o,--output", csv, "write here instead of stdout");
+    CLI::App* doc_command = app.add_subcommand("doc", "every table and key of a scene");
+    doc_command->add_option("table", table, "only this table");
+    BenchOptions bench_options;
+    CLI::App* bench_command = app.add_subcommand("bench", "speed of the particle methods on this machine");
+    bench_command->add_option("--method", bench_options.methods, "only these methods");
+    bench_command->add_option("--law", bench_options.laws, "elastic, mohr_coulomb")->check(CLI::IsMember({"elastic", "mohr_coulomb"}));
+    bench_command->add_option("--points", bench_options.points, "numbers of points, about, 16 to 1e9");
+    bench_command->add_option("--threads", bench_options.threads, "default: 1 and all")->check(CLI::Range(1, 1024));
+    bench_command->add_option("--seconds", bench_options.seconds, "of each measurement, at most 3600");
+    bench_command->add_option("-o,--output", bench_options.output,
+                              "write a CSV file, too; named bench.csv in a folder given to `testbed report` it goes into the report");
+    ModesOptions modes_options;
+    CLI::App* modes_command = app.add_subcommand("modes", "what small disturbances of a state grow to: modes, null modes, critical step");
+    add_scene_options(*modes_command, modes_options.scene);
+    modes_command->add_option("--at", modes_options.at, "time of the state [s]; at least one step is made")->check(CLI::NonNegativeNumber);
+    modes_command->add_option("--steps", modes_options.steps, "steps of the map, such as those in which a body moves by a cell")
+        ->check(CLI::Range(1, 100000));
+    modes_command->add_option("--top", modes_options.top, "modes of each sort that are shown")->check(CLI::Range(1, 1000));
+    modes_command->add_option("--frequency", modes_options.frequency, "exact frequency of the mode that is shown first [Hz]")
+        ->check(CLI::PositiveNumber);
+    modes_command->add_option("--tolerance", modes_options.tolerance, "growth in the map that is not yet called unstable")
+        ->check(CLI::PositiveNumber);
+    modes_command->add_flag("--no-critical-step", modes_options.leave_out_critical, "leave out the bisection for the critical step");
+    modes_command->add_flag("--json", modes_options.json, "print JSON");
+    modes_command->add_option("-o,--output", modes_options.scene.output, "write shapes (.h5), a picture of them (.png) or a table (.csv)");
+    app.add_subcommand("list", "methods and material laws");
+    app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
+    app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
+    try
+    {
+        app.parse(argc, argv);
+    }
+    catch (const CLI::ParseError& e)
+    {
+        return app.exit(e) == 0 ? 0 : static_cast<int>(ExitCode::bad_scene);
+    }
+    if (run_command->parsed())
+    {
+        const std::string method = load_scene(options.scene, options.method, options.overrides).scene.method;
+        if (find_variant(method).family == Family::fem)
+            become("testbed-fem", rest_of(argc, argv, 2));
+        return static_cast<int>(run_scene(options, make_particle_solver));
+    }
+    if (check_command->parsed())
+        check(options, resolved);
+    else if (point_command->parsed())
+    {
+        const std::string text = drive_point(law);
+        if (csv.empty())
+            fmt::print("{}", text);
+        else
+            try
+            {
+                write_text(csv, text);
+            }
+            catch (const OutputError& e)
+            {
+                throw SceneError(e.what());  // nothing was lost: the user's to mend
+            }
+    }
+    else if (bench_command->parsed())
+        bench(bench_options, make_particle_solver);
+    else if (modes_command->parsed())
+    {
+        if (const auto picture = modes(modes_options, make_particle_solver))
+            become("testbed-modes-plot", {picture->first, picture->second});
+    }
+    else if (doc_command->parsed())
+        fmt::print("{}", scene_documentation(table));
+    else
+        list();
+    return 0;
+}
+}  // namespace
+}  // namespace testbed
+
+int main(int argc, char** argv)
+{
+    return testbed::guarded_main([&] { return testbed::run(argc, argv); });
+}

@@ -1,0 +1,73 @@
+#pragma once
+/// A named array of one number per point. A field that a scene does not need is never allocated.
+
+#include "core/base/parallel.hpp"
+#include "core/base/simd.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace testbed
+{
+/// Room for n numbers whose old values are not needed: no more than that, where resize() may take twice as much.
+inline void make_room(std::vector<double>& workspace, std::size_t n)
+{
+    if (workspace.size() < n)
+        std::vector<double>(n).swap(workspace);
+}
+
+/// `count` values from place `from` to place `to`.
+struct Move
+{
+    std::uint32_t from, to, count;
+};
+
+template <class T>
+class Field
+{
+public:
+    constexpr Field(std::string_view name, std::string_view unit) : name_(name), unit_(unit) {}
+
+    std::string_view name() const { return name_; }
+    std::string_view unit() const { return unit_; }
+    bool active() const { return !data_.empty(); }
+    std::size_t bytes() const { return data_.capacity() * sizeof(T); }
+
+    /// Allocates n values, padded so that a whole pack may be loaded from any of them.
+    void activate(std::size_t n, T value = T{}) { data_.assign(n + pack_size, value); }
+
+    T* data() { return data_.data(); }
+    const T* data() const { return data_.data(); }
+    T& operator[](std::size_t p)
+    {
+        assert(p < data_.size());
+        return data_[p];
+    }
+    const T& operator[](std::size_t p) const
+    {
+        assert(p < data_.size());
+        return data_[p];
+    }
+
+    /// Moves blocks of values, by way of `workspace`, which must hold as many as there are points.
+    void reorder(std::span<const Move> moves, double* workspace)
+    {
+        parallel_for(moves.size(), [&](std::size_t k) { std::copy_n(&data_[moves[k].from], moves[k].count, workspace + moves[k].to); });
+        parallel_for(moves.size(),
+                     [&](std::size_t k)
+                     {
+                         const double* from = workspace + moves[k].to;
+                         std::transform(from, from + moves[k].count, &data_[moves[k].to], [](double v) { return static_cast<T>(v); });
+                     });
+    }
+
+private:
+    std::string_view name_, unit_;
+    std::vector<T> data_;
+};
+}  // namespace testbed

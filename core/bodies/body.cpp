@@ -1,0 +1,192 @@
+#include "core/bodies/body.hpp"
+
+#include "core/bodies/density_scaling.hpp"
+#include "core/bodies/random_field.hpp"
+#include "core/materials/make_material.hpp"
+#include "core/scene/geometry.hpp"
+
+#include <cmath>
+#include <fmt/format.h>
+
+namespace testbed
+{
+namespace
+{
+/// Parameters of a material at its points; one value if it is the same everywhere.
+struct PointParameters
+{
+    std::vector<double> stiffness, cohesion, friction;
+    double truncated_share = 0;
+
+    Varying varying() const { return {stiffness.size() > 1, cohesion.size() > 1}; }
+};
+
+class ParameterReader
+{
+public:
+    ParameterReader(const Scene& scene, const MaterialSpec& material) : scene_(scene), material_(material) {}
+
+    /// Values of a parameter at the points, one if the text is a number. @throws SceneError where it is not valid
+    std::vector<double> read(const char* key, const std::string& text, const std::vector<Vec2>& positions, bool everywhere, auto&& is_valid,
+                             const char* rule) const
+    {
+        const Expression expression(text, scene_.expression_constants());
+        std::vector<double> values(everywhere || !is_number(text) ? positions.size() : 1);
+        for (std::size_t p = 0; p < values.size(); ++p)
+        {
+            const Vec2& X = positions[p];
+            values[p] = expression({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
+            if (!std::isfinite(values[p]) || !is_valid(values[p]))
+                throw SceneError(fmt::format("{}: material '{}': {} = {} at ({}, {}) m, {}", scene_.path, material_.name, key, values[p],
+                                             X[0], X[1], rule));
+        }
+        return values;
+    }
+
+private:
+    const Scene& scene_;
+    const MaterialSpec& material_;
+};
+
+PointParameters read_parameters(const Scene& scene, const BodySpec& body, const MaterialSpec& material, const std::vector<Vec2>& positions,
+                                std::uint32_t first_id)
+{
+    const ParameterReader reader(scene, material);
+    PointParameters out;
+    out.stiffness = reader.read(
+        "youngs_modulus", material.youngs_modulus, positions, false, [](double v) { return v > 0; }, "must be positive");
+    if (!material.has_strength())
+        return out;
+    const StrengthSpec& strength = *material.strength;
+    const bool varies = material.random || !is_number(strength.cohesion) || !is_number(strength.friction_angle);
+    out.cohesion = reader.read(
+        "strength.cohesion", strength.cohesion, positions, varies, [](double v) { return v >= 0; }, "must not be negative");
+    out.friction = reader.read(
+        "strength.friction_angle", strength.friction_angle, positions, varies,
+        [&](double v) { return v >= strength.dilatancy_angle && v < 0.5 * std::numbers::pi; },
+        "must lie between the dilatancy angle and pi/2 (radians)");
+    if (material.random)
+    {
+        // an inclusion must not change the soil around it
+        const std::vector<std::uint32_t> number = numbers_without_inclusions(scene, body);
+        RandomStrength random(*material.random, strength.dilatancy_angle);
+        for (std::size_t p = 0; p < positions.size(); ++p)
+            random.draw(positions[p], first_id + number[p], out.cohesion[p], out.friction[p]);
+        out.truncated_share = random.truncated_share();
+    }
+    return out;
+}
+
+void set_initial_stress(const std::array<std::string, 4>& text, const Constants& constants, Points& q)
+{
+    std::vector<Expression> stress;
+    for (const std::string& component : text)
+        stress.emplace_back(component, constants);
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        const Place here{.X = q.x[p], .Y = q.y[p], .x = q.x[p], .y = q.y[p]};
+        q.sxx[p] = stress[0].finite(here);
+        q.syy[p] = stress[1].finite(here);
+        if (q.szz.active())
+            q.szz[p] = stress[2].finite(here);
+        q.sxy[p] = stress[3].finite(here);
+    }
+}
+}  // namespace
+
+Lattice make_lattice(const GridSpec& grid)
+{
+    return {grid.origin, grid.cell_size, static_cast<int>(std::lround(grid.size[0] / grid.cell_size)),
+            static_cast<int>(std::lround(grid.size[1] / grid.cell_size))};
+}
+
+std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointNeeds needs)
+{
+    const Constants constants = scene.expression_constants();
+    std::vector<Body> bodies;
+    std::uint32_t next_id = 0;
+    for (const BodySpec& spec : scene.bodies)
+    {
+        const std::vector<Vec2> positions = fill(scene, spec);
+        if (positions.empty())
+            throw SceneError(
+                fmt::format("{}: body '{}' has no points; it is smaller than the spacing of its points", scene.path, spec.name));
+        MaterialSpec material = scene.material(spec.material);
+        if (material.has_strength() && !needs.strength)
+            material.law = MaterialSpec::Law::linear_elastic;
+        const std::size_t n = positions.size();
+        const PointParameters parameters = read_parameters(scene, spec, material, positions, next_id);
+        const Varying varying = parameters.varying();
+        const double largest = *std::max_element(parameters.stiffness.begin(), parameters.stiffness.end());
+        const Strength<> strength = material.has_strength() && !varying.strength
+                                        ? Strength<>{parameters.cohesion[0], std::sin(parameters.friction[0])}
+                                        : Strength<>{0, 0};
+        bodies.push_back({spec.name,
+                          {},
+                          make_material(material, {largest, material.poissons_ratio}, strength, scene.grid.cell_size, varying),
+                          Bins(lattice),
+                          scene.confinement ? scene.confinement->pressure : 0.0,
+                          parameters.truncated_share});
+
+        Points& q = bodies.back().points;
+        const double h = spacing(spec, scene.grid);
+        q.count = n;
+        q.initial_volume = h * h;
+        q.mass = material.density * h * h;
+        for (Field<double>* field : {&q.x, &q.y, &q.sxx, &q.syy, &q.sxy})
+            field->activate(n);
+        if (needs.initial_position)
+        {
+            q.X.activate(n);
+            q.Y.activate(n);
+        }
+        q.id.activate(n);
+        if (needs.box)
+        {
+            q.half_x.activate(n, h / 2);
+            q.half_y.activate(n, h / 2);
+        }
+        else
+            q.volume.activate(n, h * h);
+        if (needs.velocity)
+        {
+            q.vx.activate(n);
+            q.vy.activate(n);
+        }
+        std::visit([&](const auto& law) { law.allocate(q); }, bodies.back().material);
+        std::optional<VectorExpression> velocity;
+        if (needs.velocity && spec.velocity)
+            velocity.emplace(*spec.velocity, constants);
+        for (std::size_t p = 0; p < n; ++p)
+        {
+            const Vec2& X = positions[p];
+            q.x[p] = X[0];
+            q.y[p] = X[1];
+            if (needs.initial_position)
+            {
+                q.X[p] = X[0];
+                q.Y[p] = X[1];
+            }
+            q.id[p] = next_id++;
+            if (varying.stiffness)
+                q.stiffness[p] = parameters.stiffness[p] / largest;
+            if (varying.strength)
+            {
+                q.cohesion[p] = parameters.cohesion[p];
+                q.sin_friction[p] = std::sin(parameters.friction[p]);
+            }
+            if (velocity)
+            {
+                const Vec2 v = (*velocity)({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
+                q.vx[p] = v[0];
+                q.vy[p] = v[1];
+            }
+        }
+        if (spec.initial_stress)
+            set_initial_stress(*spec.initial_stress, constants, q);
+    }
+    if (scene.time.density_scaling)
+        scale_densities(bodies);
+    return bodies;
+}
+}  // namespace testbed

@@ -1,0 +1,48 @@
+#pragma once
+/// A body: points of one material, the paper's cluster. Bodies on one lattice are perfectly bonded.
+
+#include "core/lattice/bins.hpp"
+#include "core/materials/material.hpp"
+#include "core/scene/scene.hpp"
+
+#include <limits>
+
+namespace testbed
+{
+struct Body
+{
+    std::string name;
+    Points points;
+    Material material;
+    Bins bins;
+    double confinement = 0;      ///< pressure on free surfaces: forces come from the stress beyond it [Pa]
+    double truncated_share = 0;  ///< of the random strengths drawn
+    double counted_volume = std::numeric_limits<double>::infinity();  ///< most of a point over which its stress counts [m^2]
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.group("body/" + name,
+                [&]
+                {
+                    points.state(a);
+                    a.group("bins", [&] { bins.state(a); });
+                });
+    }
+};
+
+/// What a method asks of each point beyond position and stress.
+struct PointNeeds
+{
+    bool box = false;              ///< half widths; the volume then follows from them
+    bool velocity = false;         ///< velocity on the points
+    bool initial_position = true;  ///< kept with the points, for what is evaluated there in each step
+    bool strength = true;          ///< else the elastic part of a law is all that is asked
+};
+
+Lattice make_lattice(const GridSpec& grid);
+
+/// The bodies of a scene with their initial velocity if the method keeps it on the points.
+/// @throws SceneError when a body has no points or a material parameter is out of range at a point
+std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointNeeds needs);
+}  // namespace testbed

@@ -1,0 +1,73 @@
+#include "core/bodies/point_sums.hpp"
+
+#include <cmath>
+
+namespace testbed
+{
+double work_over_energy(double volume_ratio)
+{
+    const double z = (volume_ratio - 1) / (volume_ratio + 1);
+    if (std::abs(z) < 0.05)
+    {
+        const double a = z * (2 + z * z * (2.0 / 3));  // ln to z^5
+        return 1 - a / 3 * (1 - a / 4 * (1 - a / 5 * (1 - a / 6)));
+    }
+    if (!(volume_ratio > 0 && std::isfinite(volume_ratio)))
+        return 1;
+    const double a = std::log(volume_ratio);
+    return 2 * (a - 1 + 1 / volume_ratio) / (a * a);
+}
+
+double strain_energy(const Points& q, const ElasticModuli& base, std::size_t p)
+{
+    const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
+    return q.current_volume(p) * elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}, out_of_plane_stress(base, q, p)) / softer;
+}
+
+double strain_energy(const std::vector<Body>& bodies)
+{
+    double total = 0;
+    for (const Body& body : bodies)
+        total += ordered_sum<1>(body.points.count, [&, base = moduli(body.material)](std::size_t p)
+                                { return std::array{strain_energy(body.points, base, p)}; })[0];
+    return total;
+}
+
+PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice)
+{
+    PointSums total;
+    const Vec2 low = lattice.origin, high{low[0] + lattice.nx * lattice.cell_size, low[1] + lattice.ny * lattice.cell_size};
+    for (const Body& body : bodies)
+    {
+        const Points& q = body.points;
+        const ElasticModuli base = moduli(body.material);
+        const double initial = 1 / q.initial_volume, mass = q.mass * q.weight_share;
+        const auto s = ordered_sum<6>(q.count,
+                                      [&](std::size_t p)
+                                      {
+                                          const double volume = q.current_volume(p), energy = strain_energy(q, base, p);
+                                          const bool inside =
+                                              q.x[p] >= low[0] && q.x[p] <= high[0] && q.y[p] >= low[1] && q.y[p] <= high[1];
+                                          return std::array<double, 6>{energy,        energy * work_over_energy(volume * initial),
+                                                                       volume,        mass * q.x[p],
+                                                                       mass * q.y[p], inside ? 0.0 : 1.0};
+                                      });
+        total.strain_energy += s[0];
+        total.elastic_work += s[1];
+        total.volume += s[2];
+        total.mass += mass * static_cast<double>(q.count);
+        total.moment[0] += s[3];
+        total.moment[1] += s[4];
+        total.outside += s[5];
+        const auto largest = [&](auto&& f) { return parallel_max(q.count, f); };
+        total.max_stress = std::max(total.max_stress, largest(
+                                                          [&](std::size_t p) {
+                                                              return std::max({std::abs(q.sxx[p]), std::abs(q.syy[p]), std::abs(q.sxy[p])});
+                                                          }));
+        total.largest = std::max(total.largest, initial * largest([&](std::size_t p) { return q.current_volume(p); }));
+        const double denser = largest([&](std::size_t p) { return 1 / q.current_volume(p); });
+        total.smallest = std::min(total.smallest, initial / denser);
+    }
+    return total;
+}
+}  // namespace testbed

@@ -1,0 +1,348 @@
+#pragma once
+/// Points kept contiguous by bin. A bin is the cell that holds the lower left corner of a point's support, so that all its
+/// points touch the same S x S cells or nodes. Points are sorted only in a step in which one changed its bin, the list of bins changes only
+/// if one is new or empty.
+
+#include "core/lattice/grid.hpp"
+#include "core/lattice/points.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace testbed
+{
+/// Rounding must not move a box that ends on a lattice line into the next cell [cells].
+inline constexpr double bin_tolerance = 1e-9;
+
+struct Bin
+{
+    int i = 0, j = 0;
+    std::uint32_t begin = 0, end = 0;  ///< points
+};
+
+class Bins
+{
+public:
+    explicit Bins(const Lattice& lattice) : lattice_(lattice), slots_(without_numbers(lattice)) {}
+
+    const std::vector<Bin>& list() const { return bins_; }
+    /// The number that bin b had before the last rebuild() if the same points are in it, which then were not marked.
+    std::optional<std::uint32_t> unchanged(std::size_t b) const { return before_[b] == none ? std::nullopt : std::optional(before_[b]); }
+    std::size_t size_before() const { return size_before_; }
+    /// The bins that are not unchanged, if the last rebuild() left the list as it was; else none.
+    const std::vector<std::uint32_t>& changed() const { return changed_; }
+
+    /// Notes that a point of bin number `b` may have left it. Different bins may be marked by different threads.
+    void mark(std::size_t b) { marked_[b] = 1; }
+
+    /// Sorts the points by bin, the first time all of them, then those of marked bins: the others go where they go as a block.
+    /// Returns whether the list of bins is another one than before.
+    /// @param workspace grows to the number of points
+    /// @throws Diverged when a point has left the lattice or its position is not finite.
+    template <class Support>
+    bool rebuild(Points& points, std::vector<double>& workspace)
+    {
+        const bool is_first = bins_.empty();
+        size_before_ = bins_.size();
+        if (is_first)
+        {
+            bins_.push_back({0, 0, 0, static_cast<std::uint32_t>(points.count)});
+            marked_.assign(1, 1);
+        }
+        before_.resize(bins_.size());
+        std::iota(before_.begin(), before_.end(), 0u);
+        list_marked();
+        find_keys<Support>(points);
+        if (const auto lost = find_lost())
+        {
+            if (is_first)
+                bins_.clear();
+            throw_left_lattice(points, *lost);
+        }
+        if (is_first)
+            std::tie(bins_[0].i, bins_[0].j) = std::pair(lattice_.cell_i(key_[0]), lattice_.cell_j(key_[0]));
+        make_slots();
+        const bool has_new = insert_new();
+        exchange();
+        const bool has_lost = erase_empty();
+        if (has_new || has_lost)
+            changed_.clear();
+        marked_.assign(bins_.size(), 0);
+        if (!moves_.empty())
+        {
+            make_room(workspace, points.count);
+            points.for_each_field([&](auto& field) { field.reorder(moves_, workspace.data()); });
+        }
+        return is_first || has_new || has_lost;
+    }
+
+    /// The marks, too: between two steps points may have left the bins in which they still stand.
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.column("i", "-", bins_, &Bin::i);
+        a.column("j", "-", bins_, &Bin::j);
+        a.column("begin", "-", bins_, &Bin::begin);
+        a.column("end", "-", bins_, &Bin::end);
+        a.column("marked", "-", marked_);
+        if constexpr (Archive::reads)
+        {
+            slots_ = without_numbers(lattice_);
+            before_.assign(bins_.size(), none);
+        }
+    }
+    bool has_marks() const { return std::find(marked_.begin(), marked_.end(), 1) != marked_.end(); }
+
+    std::size_t bytes() const
+    {
+        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + moves_.capacity() * sizeof(Move) +
+               marked_.capacity() +
+               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity()) * sizeof(std::uint32_t);
+    }
+
+private:
+    static constexpr std::uint32_t none = ~std::uint32_t{0};
+
+    void list_marked()
+    {
+        marks_.clear();
+        for (auto m = std::find(marked_.begin(), marked_.end(), 1); m != marked_.end(); m = std::find(m + 1, marked_.end(), 1))
+            marks_.push_back(static_cast<std::uint32_t>(m - marked_.begin()));
+    }
+    template <class Support>
+    void find_keys(const Points& points)
+    {
+        key_.resize(points.count);
+        parallel_for(marks_.size(),
+                     [&](std::size_t m)
+                     {
+                         for (std::size_t p = bins_[marks_[m]].begin; p < bins_[marks_[m]].end; ++p)
+                             key_[p] = key<Support>(points, p);
+                     });
+    }
+    /// f(bin number, point) for the points of marked bins.
+    template <class F>
+    void for_each_marked(F&& f)
+    {
+        for (const auto b : marks_)
+            for (std::uint32_t p = bins_[b].begin; p < bins_[b].end; ++p)
+                f(b, p);
+    }
+    std::optional<std::size_t> find_lost()
+    {
+        std::optional<std::size_t> lost;
+        for_each_marked(
+            [&](std::uint32_t, std::uint32_t p)
+            {
+                if (key_[p] == none && !lost)
+                    lost = p;
+            });
+        return lost;
+    }
+
+    /// Slots for all cells that points of marked bins go to.
+    void make_slots()
+    {
+        CellBox reach = no_cells;
+        for_each_marked(
+            [&](std::uint32_t, std::uint32_t p)
+            {
+                const int i = lattice_.cell_i(key_[p]), j = lattice_.cell_j(key_[p]);
+                reach.extend({i, j, i + 1, j + 1});
+            });
+        if (with_numbers_for(slots_, reach).numbered == slots_.numbered)
+            return;
+        for (const Bin& b : bins_)
+            reach.extend({b.i, b.j, b.i + 1, b.j + 1});
+        slots_ = with_numbers_for(slots_, reach);
+        slot_.assign(slots_.cells(), -1);
+        for (std::size_t b = 0; b < bins_.size(); ++b)
+            slot_of(bins_[b]) = static_cast<std::int32_t>(b);
+    }
+
+    /// Empty bins for the points that have none yet, in the order of cells.
+    bool insert_new()
+    {
+        std::vector<std::uint32_t> cells;
+        for_each_marked(
+            [&](std::uint32_t, std::uint32_t p)
+            {
+                if (std::int32_t& slot = slot_[place(key_[p])]; slot < 0)
+                {
+                    slot = 0;
+                    cells.push_back(key_[p]);
+                }
+            });
+        if (cells.empty())
+            return false;
+        std::sort(cells.begin(), cells.end());
+        const std::vector<Bin> old = std::exchange(bins_, {});
+        const std::vector<char> old_marked = std::exchange(marked_, {});
+        before_.clear();
+        const auto add = [&](const Bin& bin, char is_marked, std::uint32_t number)
+        {
+            slot_of(bin) = static_cast<std::int32_t>(bins_.size());
+            bins_.push_back(bin);
+            marked_.push_back(is_marked);
+            before_.push_back(number);
+        };
+        auto cell = cells.begin();
+        const auto add_up_to = [&](std::size_t end, std::uint32_t place)
+        {
+            for (; cell != cells.end() && *cell < end; ++cell)
+                add({lattice_.cell_i(*cell), lattice_.cell_j(*cell), place, place}, 0, none);
+        };
+        for (std::uint32_t b = 0; b < old.size(); ++b)
+        {
+            add_up_to(lattice_.cell(old[b].i, old[b].j), old[b].begin);
+            add(old[b], old_marked[b], b);
+        }
+        add_up_to(none, old.back().end);
+        list_marked();
+        return true;
+    }
+
+    /// Finds how points go to their bins: the blocks that move, neighbours with the same way taken together. All bins between the first
+    /// and the last that wins or loses points may shift.
+    void exchange()
+    {
+        moves_.clear();
+        changed_.clear();
+        std::uint32_t first = none, last = 0;
+        const auto touch = [&](std::uint32_t b)
+        {
+            first = std::min(first, b);
+            last = std::max(last, b);
+            if (std::exchange(before_[b], none) != none)
+                changed_.push_back(b);
+        };
+        next_.resize(bins_.size());
+        for (const auto b : marks_)
+            touch(b);
+        for_each_marked([&](std::uint32_t, std::uint32_t p) { touch(slot(p)); });
+        if (first == none)
+            return;
+        for (std::uint32_t b = first; b <= last; ++b)
+            next_[b] = bins_[b].end - bins_[b].begin;
+        for_each_marked(
+            [&](std::uint32_t b, std::uint32_t p)
+            {
+                --next_[b];
+                ++next_[slot(p)];
+            });
+        std::exclusive_scan(next_.begin() + first, next_.begin() + last + 1, next_.begin() + first, bins_[first].begin);
+        const auto move = [&](std::uint32_t from, std::uint32_t bin, std::uint32_t n)
+        {
+            std::uint32_t& to = next_[bin];
+            if (!moves_.empty() && moves_.back().from + moves_.back().count == from && moves_.back().to + moves_.back().count == to)
+                moves_.back().count += n;
+            else if (from != to)
+                moves_.push_back({from, to, n});
+            to += n;
+        };
+        const std::uint32_t begin = bins_[first].begin;
+        for (std::uint32_t b = first; b <= last; ++b)
+            if (!marked_[b])
+                move(bins_[b].begin, b, bins_[b].end - bins_[b].begin);
+            else
+                for (std::uint32_t p = bins_[b].begin; p < bins_[b].end; ++p)
+                    move(p, slot(p), 1);
+        for (std::uint32_t b = first; b <= last; ++b)  // each has been filled up to the next
+        {
+            bins_[b].begin = b == first ? begin : bins_[b - 1].end;
+            bins_[b].end = next_[b];
+        }
+    }
+
+    bool erase_empty()
+    {
+        if (std::none_of(marks_.begin(), marks_.end(), [&](std::uint32_t b) { return bins_[b].begin == bins_[b].end; }))
+            return false;
+        std::size_t kept = 0;
+        for (std::size_t b = 0; b < bins_.size(); ++b)
+        {
+            const bool is_empty = bins_[b].begin == bins_[b].end;
+            slot_of(bins_[b]) = is_empty ? -1 : static_cast<std::int32_t>(kept);
+            if (is_empty)
+                continue;
+            bins_[kept] = bins_[b];
+            before_[kept++] = before_[b];
+        }
+        bins_.resize(kept);
+        before_.resize(kept);
+        return true;
+    }
+
+    /// Number of the bin to which a point of a marked bin goes.
+    std::uint32_t slot(std::uint32_t p) const { return static_cast<std::uint32_t>(slot_[place(key_[p])]); }
+    std::size_t place(std::uint32_t cell) const { return slots_.cell(lattice_.cell_i(cell), lattice_.cell_j(cell)); }
+    std::int32_t& slot_of(const Bin& bin) { return slot_[slots_.cell(bin.i, bin.j)]; }
+
+    template <class Support>
+    std::uint32_t key(const Points& points, std::size_t p) const
+    {
+        const double L = lattice_.cell_size;
+        const double cx = (points.x[p] - lattice_.origin[0]) / L, cy = (points.y[p] - lattice_.origin[1]) / L;
+        const bool inside = cx >= 0 && cx < lattice_.nx && cy >= 0 && cy < lattice_.ny;  // false for NaN
+        if (!inside)
+            return none;
+        if constexpr (!Support::has_box)
+            if (points.volume.active() && !(points.volume[p] > 0))
+                return none;
+        if constexpr (Support::has_box)
+        {
+            if (!(points.half_x[p] > 0 && points.half_y[p] > 0))
+                return none;
+            const double hx = std::min(points.half_x[p] / L, 0.5), hy = std::min(points.half_y[p] / L, 0.5);
+            return static_cast<std::uint32_t>(lattice_.cell(static_cast<int>(std::floor(cx - hx + bin_tolerance)),
+                                                            static_cast<int>(std::floor(cy - hy + bin_tolerance))));
+        }
+        else
+        {
+            constexpr double half = Support::half_width;
+            return static_cast<std::uint32_t>(
+                lattice_.cell(static_cast<int>(std::floor(cx - half)), static_cast<int>(std::floor(cy - half))));
+        }
+    }
+
+    [[noreturn]] static void throw_left_lattice(const Points& points, std::size_t p);
+
+    Lattice lattice_;
+    std::vector<Bin> bins_;
+    Lattice slots_;                   ///< with numbers for the cells around the points
+    std::vector<std::int32_t> slot_;  ///< number of the bin of each of these, or -1
+    std::vector<char> marked_;
+    std::vector<std::uint32_t> marks_;   ///< numbers of the marked bins
+    std::vector<std::uint32_t> key_;     ///< cell of each point of a marked bin
+    std::vector<std::uint32_t> before_;  ///< number of each bin before the last rebuild if it is unchanged, or `none`
+    std::vector<std::uint32_t> changed_;
+    std::vector<std::uint32_t> next_;  ///< where the next point of each bin goes
+    std::vector<Move> moves_;
+    std::size_t size_before_ = 0;
+};
+
+/// The lattice with numbers for all that the S x S cells or nodes of bins touch.
+template <int S>
+Lattice with_numbers_for(const Lattice& lattice, std::span<const Bins* const> bins)
+{
+    CellBox reach = no_cells;
+    for (const Bins* b : bins)
+        for (const Bin& bin : b->list())
+            reach.extend({bin.i, bin.j, bin.i + S, bin.j + S});
+    return with_numbers_for(lattice, reach);
+}
+
+/// Whether a support that began in bin coordinate a = (corner - bin) / L, in [0, 1), still does; false for NaN.
+template <class T>
+TESTBED_INLINE inline auto is_in_bin(T a)
+{
+    return a >= T(-bin_tolerance) && a < T(1 - bin_tolerance);
+}
+}  // namespace testbed

@@ -1,0 +1,67 @@
+#pragma once
+/// Moving walls (section 2.2 of the paper): all nodes lined up at the wall get its displacement increments; after one cell of
+/// travel the next line does. And a smooth variant, which prescribes the velocity at the wall's faces, wherever they lie.
+
+#include "core/loads/restraint.hpp"
+#include "core/scene/wall_path.hpp"
+
+namespace testbed
+{
+class Wall
+{
+public:
+    Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice);
+
+    /// Sets the restraint to the nodes that the wall covers at time t, and to its velocity in the middle of the coming step. Returns
+    /// whether they are others than before.
+    /// @throws Diverged if the wall has left the lattice
+    bool begin_step(double t, double dt, Restraint& restraint);
+    void end_step(double dt);
+
+    /// @param restraint of this wall, which gets the nodes back that it had
+    template <class Archive>
+    void state(Archive& a, Restraint& restraint)
+    {
+        a.vector("travel", "m", travel_);
+        bool has_nodes = taken_.has_value();
+        Region region = taken_.value_or(Region{});
+        a.value("has_nodes", "-", has_nodes);
+        a.vector("min", "m", region.min);
+        a.vector("max", "m", region.max);
+        a.value("door_open", "-", region.door_open);
+        if constexpr (Archive::reads)
+        {
+            taken_.reset();
+            if (has_nodes)
+                take(region, restraint);
+        }
+    }
+
+    /// Since the start [m].
+    const Vec2& displacement() const { return travel_; }
+    /// Nodes that the last begin_step() added; not those of the start.
+    const std::vector<NodeIndex>& new_nodes() const { return new_nodes_; }
+
+private:
+    struct Region
+    {
+        Vec2 min{0, 0}, max{0, 0};
+        bool door_open = false;
+        bool operator==(const Region&) const = default;
+    };
+    Region region(double t) const;
+    bool is_open_at(const Region& region, const Vec2& place) const;
+    void take(const Region& region, Restraint& restraint);
+    void take_nodes(const Region& region, Restraint& restraint);
+    void take_faces(const Region& region, Restraint& restraint) const;
+    void check_on_lattice(const Region& region, double t) const;
+
+    WallSpec spec_;
+    Lattice lattice_;
+    double reach_;  ///< of the soil beyond the nodes that its mass reaches [cells]
+    std::optional<VectorExpression> velocity_;
+    Vec2 travel_{0, 0}, travel_rate_{0, 0};
+    std::optional<Region> taken_;
+    std::vector<NodeIndex> covered_, new_nodes_;
+};
+}  // namespace testbed

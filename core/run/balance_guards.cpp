@@ -1,0 +1,311 @@
+#include "core/run/balance_guards.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <map>
+
+namespace testbed
+{
+namespace
+{
+/// Energy must not come from nowhere. It may be lost, as in any contact of points on a lattice.
+class EnergyGuard final : public Guard
+{
+public:
+    /// Where the motion is that of nodes, their lumped masses hold more of it than the points do, and a share that changes as a body turns
+    /// on the lattice: what is made counts as far as the points have it, too.
+    void watch(const GuardSample& s, const Solver&) override
+    {
+        if (s.is_fresh)
+            beside_nodes_ = s.point_motion.kinetic_energy - s.energy.kinetic;
+        at_start_ = at_start_.value_or(beside_nodes_);
+        made_ = std::max(made_, s.energy.numerical + std::min(0.0, beside_nodes_ - *at_start_));
+        most_plastic_ = std::max(most_plastic_, s.energy.plastic);
+        made_by_law_ = std::max(made_by_law_, most_plastic_ - s.energy.plastic);
+        scale_ = s.energy_scale;
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (made_ > limits::energy_gain * scale_)
+            return Finding{"energy", fmt::format("the numbers made {:.3g} J/m, {:.3g} times what the loads and the start brought in", made_,
+                                                 made_ / scale_)};
+        if (made_by_law_ > limits::energy_gain * scale_)
+            return Finding{"energy", fmt::format("the stresses gave back {:.3g} J/m that had been dissipated, {:.3g} times what the loads "
+                                                 "and the start brought in",
+                                                 made_by_law_, made_by_law_ / scale_)};
+        return std::nullopt;
+    }
+
+private:
+    double made_ = 0, most_plastic_ = 0, made_by_law_ = 0, scale_ = 0;
+    double beside_nodes_ = 0;           ///< kinetic energy of the points less that of the nodes, when last looked at
+    std::optional<double> at_start_{};  ///< so at the start
+};
+
+/// Energy that an elastic body without damping loses to the numbers: to motion and stress that the lattice does not resolve. Some of it is
+/// lost in any contact; of a run that lost much of it the motion tells nothing.
+class LossGuard final : public Guard
+{
+public:
+    void watch(const GuardSample& s, const Solver&) override
+    {
+        if (s.is_fresh)
+            share_ = -s.energy.numerical / std::max(s.energy_scale, 1e-300);
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (share_ > limits::energy_loss)
+            return Finding{"loss", fmt::format("the numbers took {:.2g} times what the loads and the start brought in, though the body is "
+                                               "elastic and nothing damps it",
+                                               share_)};
+        return std::nullopt;
+    }
+
+private:
+    double share_ = 0;
+};
+
+/// The weight that nodes carry and the points that have it must fall alike.
+class GravityGuard final : public Guard
+{
+public:
+    explicit GravityGuard(bool flows) : limit_(flows ? limits::gravity_work_flow : limits::gravity_work) {}
+    void watch(const GuardSample& s, const Solver&) override
+    {
+        apart_ = std::max(apart_, std::abs(s.energy.gravity - s.gravity_work) - s.gravity_work_error);
+        scale_ = s.energy_scale;
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (apart_ > limit_ * scale_)
+            return Finding{
+                "gravity_work",
+                fmt::format(
+                    "the work of gravity at the nodes and on the points differs by {:.2g} times what the loads and the start brought in",
+                    apart_ / scale_)};
+        return std::nullopt;
+    }
+
+private:
+    double limit_, apart_ = 0, scale_ = 0;
+};
+
+/// Control of hourglass patterns is no part of the body: what it takes must stay small beside the energy of the run.
+class HourglassGuard final : public Guard
+{
+public:
+    void watch(const GuardSample& s, const Solver&) override { share_ = s.energy.hourglass / std::max(s.energy_scale, 1e-300); }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (share_ > limits::hourglass)
+            return Finding{"hourglass", fmt::format("hourglass control took {:.2g} times what the loads and the start brought in", share_)};
+        return std::nullopt;
+    }
+
+private:
+    double share_ = 0;
+};
+
+/// Where nothing acts from outside.
+class MomentumGuard final : public Guard
+{
+public:
+    void watch(const GuardSample& s, const Solver&) override
+    {
+        const Vec2& p = s.motion.momentum;
+        at_start_ = at_start_.value_or(p);
+        change_ = std::max(change_, std::hypot(p[0] - (*at_start_)[0], p[1] - (*at_start_)[1]));
+        scale_ = std::max(scale_, std::sqrt(2 * s.point_motion.mass * std::max(0.0, s.point_motion.kinetic_energy)));
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        if (change_ > limits::momentum * scale_)
+            return Finding{"momentum", fmt::format("no force acts from outside, yet the momentum changed by {:.2g} of mass times speed",
+                                                   change_ / scale_)};
+        return std::nullopt;
+    }
+
+private:
+    std::optional<Vec2> at_start_{};
+    double change_ = 0, scale_ = 0;
+};
+
+/// The mean of an elastic body's oscillation under a constant weight must stay where it is: else the strains, which balance the weight, and
+/// the displacements have parted.
+class DriftGuard final : public Guard
+{
+public:
+    explicit DriftGuard(const GravitySpec& gravity) : gravity_(gravity) {}
+    void watch(const GuardSample& s, const Solver& solver) override
+    {
+        const double g = std::hypot(gravity_.acceleration[0], gravity_.acceleration[1]);
+        const Vec2 down{gravity_.acceleration[0] / g, gravity_.acceleration[1] / g};
+        body_.add(s.t, (down[0] * s.points.moment[0] + down[1] * s.points.moment[1]) / s.points.mass, s.t >= gravity_.ramp);
+        constexpr std::size_t few = 1000;  // points: a look at all of them costs next to nothing
+        std::size_t points = 0;
+        for (const Body& body : solver.bodies())
+            points += body.points.count;
+        if (!s.is_fresh && points > few)
+            return;
+        double top = std::numeric_limits<double>::infinity();
+        for (const Body& body : solver.bodies())
+            for (std::size_t p = 0; p < body.points.count; ++p)
+                top = std::min(top, down[0] * body.points.x[p] + down[1] * body.points.y[p]);
+        top_.add(s.t, top, s.t >= gravity_.ramp);
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        for (const auto& [record, what] : {std::pair{&body_, ""}, std::pair{&top_, " of the top"}})
+            if (const auto means = record->first_and_last();
+                means && std::abs(means->second - means->first) > limits::drift * std::abs(means->first))
+                return Finding{"drift", fmt::format("the mean settlement{} of an undamped oscillation went from {:.4g} to {:.4g} m, though "
+                                                    "nothing moves it",
+                                                    what, means->first, means->second)};
+        return std::nullopt;
+    }
+
+private:
+    /// How far something has fallen.
+    class Fall
+    {
+    public:
+        void add(double t, double depth, bool counts)
+        {
+            at_start_ = at_start_.value_or(depth);
+            if (!counts)
+                return;
+            t_.push_back(t);
+            fall_.push_back(depth - *at_start_);
+        }
+        /// Means of the first and the last tenth.
+        std::optional<std::pair<double, double>> first_and_last() const
+        {
+            const std::size_t tenth = t_.size() / 10;
+            const auto mean = [&](std::size_t from)
+            { return mean_of_periods(std::span(t_).subspan(from, tenth), std::span(fall_).subspan(from, tenth)); };
+            const auto first = mean(0), last = mean(t_.size() - tenth);
+            return first && last ? std::optional(std::pair{*first, *last}) : std::nullopt;
+        }
+
+    private:
+        std::optional<double> at_start_{};
+        std::vector<double> t_{}, fall_{};
+    };
+
+    GravitySpec gravity_;
+    Fall body_{}, top_{};  ///< of the centre of mass, and of the highest point
+};
+
+/// An elastic body that nothing but walls moves. However suddenly they start, a wave carries at most twice their speed: more motion is
+/// stress let go, where the body parted or its points crossed cells. Walls that turn back, or start again, may swing it up: then nothing is
+/// said.
+class ReleaseGuard final : public Guard
+{
+public:
+    void watch(const GuardSample& s, const Solver& solver) override
+    {
+        for (const RestraintRecord& r : solver.restraints())
+        {
+            if (!r.displacement)
+                continue;
+            const auto [at, is_new] = walls_.try_emplace(r.name, Wall{*r.displacement});
+            Wall& wall = at->second;
+            if (is_new || !(s.t > t_))
+                continue;
+            const Vec2 v{((*r.displacement)[0] - wall.displacement[0]) / (s.t - t_),
+                         ((*r.displacement)[1] - wall.displacement[1]) / (s.t - t_)};
+            const double speed = std::hypot(v[0], v[1]);
+            swings_ = swings_ || v[0] * wall.way[0] + v[1] * wall.way[1] < 0 || (wall.slowed && speed > 0.5 * wall.fastest);
+            wall.slowed = wall.slowed || speed < 0.5 * wall.fastest;
+            wall.fastest = std::max(wall.fastest, speed);
+            wall.displacement = *r.displacement;
+            if (speed > 0)
+                wall.way = v;
+            speed_ = std::max(speed_, speed);
+        }
+        t_ = s.t;
+        if (s.is_fresh && s.point_motion.kinetic_energy > limits::is_static * s.energy.elastic)
+            kinetic_ = std::max(kinetic_, s.point_motion.kinetic_energy), mass_ = s.point_motion.mass;
+    }
+    std::optional<Finding> finding(bool) const override
+    {
+        const double driven = 0.5 * mass_ * speed_ * speed_;
+        if (!swings_ && speed_ > 0 && kinetic_ > limits::released * driven)
+            return Finding{"released",
+                           fmt::format("the walls move at {:.3g} m/s at most, the elastic body at {:.3g} m/s in the mean: stress was "
+                                       "let go, as where a body parts or its points cross cells",
+                                       speed_, std::sqrt(2 * kinetic_ / mass_))};
+        return std::nullopt;
+    }
+
+private:
+    struct Wall
+    {
+        Vec2 displacement, way{0, 0};  ///< last velocity that was not zero
+        double fastest = 0;
+        bool slowed = false;  ///< to less than half of that
+    };
+    std::map<std::string, Wall> walls_{};
+    bool swings_ = false;
+    double t_ = 0, speed_ = 0, kinetic_ = 0, mass_ = 0;
+};
+}  // namespace
+
+std::optional<double> mean_of_periods(std::span<const double> t, std::span<const double> y)
+{
+    constexpr std::size_t many = 1000;  // samples of which the mean is good though they are too few to see each period
+    if (t.size() < 40)
+        return std::nullopt;
+    double average = 0;
+    for (std::size_t k = 0; k + 1 < t.size(); ++k)
+        average += 0.5 * (y[k] + y[k + 1]) * (t[k + 1] - t[k]) / (t.back() - t.front());
+    double area = 0, area_at_last = 0, first = 0, last = 0;  // of y - average since the first rise
+    std::size_t rises = 0;
+    for (std::size_t k = 0; k + 1 < t.size(); ++k)
+    {
+        const double a = y[k] - average, b = y[k + 1] - average, dt = t[k + 1] - t[k];
+        const bool rise = a < 0 && b >= 0;
+        const double at = rise ? t[k] + dt * a / (a - b) : 0;
+        if (rise)
+        {
+            area_at_last = rises == 0 ? 0 : area + 0.5 * a * (at - t[k]);
+            area = rises == 0 ? 0.5 * b * (t[k + 1] - at) : area + 0.5 * a * (at - t[k]) + 0.5 * b * (t[k + 1] - at);
+            first = rises == 0 ? at : first;
+            last = at;
+            ++rises;
+        }
+        else if (rises > 0)
+            area += 0.5 * (a + b) * dt;
+    }
+    if (rises < 6 || (8 * rises > t.size() && t.size() < many))
+        return std::nullopt;
+    return average + area_at_last / (last - first);
+}
+
+std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene)
+{
+    std::vector<std::unique_ptr<Guard>> guards;
+    const bool is_loaded = !scene.tractions.empty() || scene.body_force || scene.confinement;
+    const bool is_held = !scene.boundaries.empty() || !scene.walls.empty();
+    const bool is_damped = scene.damping && scene.damping->local > 0;
+    guards.push_back(std::make_unique<EnergyGuard>());
+    if (!is_damped && !scene.may_flow() && family_of(scene) != Family::fem)
+        guards.push_back(std::make_unique<LossGuard>());
+    if (scene.gravity)
+        guards.push_back(std::make_unique<GravityGuard>(scene.may_flow()));
+    if (family_of(scene) == Family::lpfdm && scene.lpfdm.hourglass > 0)
+        guards.push_back(std::make_unique<HourglassGuard>());
+    if (!is_loaded && !is_held && !is_damped && !scene.gravity)
+        guards.push_back(std::make_unique<MomentumGuard>());
+    if (!is_loaded && is_held && !is_damped && !scene.may_flow() && scene.walls.empty() && scene.gravity &&
+        std::hypot(scene.gravity->acceleration[0], scene.gravity->acceleration[1]) > 0)
+        guards.push_back(std::make_unique<DriftGuard>(*scene.gravity));
+    if (!is_loaded && !scene.gravity && !scene.may_flow() && !scene.walls.empty() &&
+        std::none_of(scene.bodies.begin(), scene.bodies.end(),
+                     [](const BodySpec& body) { return body.velocity.has_value() || body.initial_stress.has_value(); }))
+        guards.push_back(std::make_unique<ReleaseGuard>());
+    return guards;
+}
+}  // namespace testbed

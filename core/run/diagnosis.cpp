@@ -1,0 +1,209 @@
+#include "core/run/diagnosis.hpp"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <map>
+
+namespace testbed
+{
+namespace
+{
+// A smooth field has (k L)^4 / 16 of its energy in the pattern, 2 % at eight cells a wave; noise has a quarter.
+constexpr double pattern_rules = 0.2;
+// Below this share of a full node's mass the acceleration of a node is not limited by the soil around it.
+constexpr double sliver_mass = 1e-3;
+// Points of one cell see one smooth field: their spread is of the order of L over the size of the body.
+constexpr double oscillates = 0.7;
+// Points that move half a cell in a step are at the limit of convection within the next ones.
+constexpr double fast = 0.5;
+// Beyond this a point's box or volume reaches over neighbours that it has no more.
+constexpr double grown = 3;
+
+bool found(const RunFacts& facts, const char* code)
+{
+    return std::any_of(facts.findings.begin(), facts.findings.end(), [&](const Finding& f) { return f.code == code; });
+}
+
+struct Method
+{
+    bool is_mpm, point_support, linear, b_bar;
+    double hourglass;
+    bool usl;
+};
+
+Method method_of(const Scene& scene)
+{
+    const bool mpm = family_of(scene) == Family::mpm;
+    return {mpm,
+            !mpm && scene.lpfdm.support == LpfdmSpec::Support::point,
+            mpm && scene.mpm.shape == MpmSpec::Shape::linear,
+            mpm && scene.mpm.strain == MpmSpec::Strain::b_bar,
+            mpm ? 0 : scene.lpfdm.hourglass,
+            mpm && scene.mpm.scheme == MpmSpec::Scheme::usl};
+}
+
+/// A support by domains, for methods that have none.
+std::string wider_support(const Method& m)
+{
+    return m.point_support ? "lpfdm.support=domain" : m.linear ? "mpm.shape=cpgimp" : "";
+}
+
+std::string null_mode_remedy(const Scene& scene, const Method& m)
+{
+    if (!m.is_mpm)
+        return m.hourglass == 0 ? "lpfdm.hourglass=0.05" : "";
+    if (m.linear)
+        return scene.mpm.null_space_filter == MpmSpec::Filter::none ? "mpm.null_space_filter=cell" : "";
+    return scene.mpm.flip == 1 ? "mpm.flip=0.99" : "";
+}
+
+std::string sliver_remedy(const Scene& scene, const Method& m)
+{
+    if (m.is_mpm)
+        return scene.mpm.mass_cutoff < sliver_mass ? "mpm.mass_cutoff=0.001" : "";
+    return m.point_support                                              ? wider_support(m)
+           : scene.lpfdm.convection != LpfdmSpec::Convection::two_sided ? "lpfdm.convection=two_sided"
+                                                                        : "";
+}
+
+/// The time step times a share, as the scene gives it.
+std::string smaller_step(const Scene& scene, const RunFacts& facts, double share)
+{
+    return scene.time.dt ? fmt::format("time.dt={:.2g}", share * facts.dt) : fmt::format("time.cfl={:.2g}", share * scene.time.cfl);
+}
+
+double largest_volume_ratio(const std::vector<Body>& bodies)
+{
+    double largest = 0;
+    for (const Body& body : bodies)
+        for (std::size_t p = 0; p < body.points.count; ++p)
+            largest = std::max(largest, body.points.current_volume(p) / body.points.initial_volume);
+    return largest;
+}
+
+double full_mass(const std::vector<Body>& bodies, double cell_size)
+{
+    double density = 0;
+    for (const Body& body : bodies)
+        density = std::max(density, body.points.mass / body.points.initial_volume);
+    return density * cell_size * cell_size;
+}
+}  // namespace
+
+double checkerboard_share(const Lattice& lattice, const Nodes& nodes)
+{
+    double pattern = 0, all = 0;
+    const std::size_t above = lattice.node_stride();
+    for (const auto n : nodes.active())
+    {
+        if (!lattice.has_node(lattice.node_i(n) + 1, lattice.node_j(n) + 1))
+            continue;
+        const std::array<std::size_t, 4> corner{n, n + 1, n + above, n + above + 1};
+        const auto light = [&](std::size_t k) { return !(nodes.mass[k] > 0); };
+        if (std::any_of(corner.begin(), corner.end(), light))
+            continue;
+        for (const auto* v : {&nodes.vx, &nodes.vy})
+        {
+            const double h = (*v)[corner[0]] - (*v)[corner[1]] - (*v)[corner[2]] + (*v)[corner[3]];
+            double square = 0;
+            for (const std::size_t k : corner)
+                square += (*v)[k] * (*v)[k];
+            pattern += nodes.mass[n] * h * h / 4;
+            all += nodes.mass[n] * square;
+        }
+    }
+    return all > 0 ? pattern / all : 0;
+}
+
+double mass_of_fastest(const Nodes& nodes, double full)
+{
+    double fastest = 0, mass = full;
+    for (const auto n : nodes.active())
+        if (const double square = nodes.vx[n] * nodes.vx[n] + nodes.vy[n] * nodes.vy[n]; nodes.mass[n] > 0 && square > fastest)
+        {
+            fastest = square;
+            mass = nodes.mass[n];
+        }
+    return mass / full;
+}
+
+double stress_oscillation(const std::vector<Body>& bodies, const Lattice& lattice)
+{
+    double within = 0, total = 0;
+    for (const Body& body : bodies)
+    {
+        struct Sums
+        {
+            double n = 0, s = 0, square = 0;
+            void add(double v)
+            {
+                ++n;
+                s += v;
+                square += v * v;
+            }
+            double spread() const { return std::max(0.0, square - s * s / n); }
+        };
+        std::map<std::pair<double, double>, Sums> cells;
+        Sums all;
+        const Points& q = body.points;
+        for (std::size_t p = 0; p < q.count; ++p)
+        {
+            const double mean = 0.5 * (q.sxx[p] + q.syy[p]);
+            cells[{std::floor((q.x[p] - lattice.origin[0]) / lattice.cell_size),
+                   std::floor((q.y[p] - lattice.origin[1]) / lattice.cell_size)}]
+                .add(mean);
+            all.add(mean);
+        }
+        for (const auto& [place, cell] : cells)
+            within += cell.spread();
+        total += all.spread();
+    }
+    return total > 0 ? std::sqrt(within / total) : 0;
+}
+
+Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& facts)
+{
+    const bool nearly_incompressible = std::any_of(scene.materials.begin(), scene.materials.end(),
+                                                   [](const MaterialSpec& material) { return material.poissons_ratio > 0.45; });
+    const auto [lattice, nodes] = solver.nodes();
+    if (!lattice)  // the FEM reference
+        return found(facts, "noise") && nearly_incompressible ? Diagnosis{"locking", scene.fem.degree == 1 ? "fem.degree=2" : ""}
+                                                              : Diagnosis{};
+    const Method m = method_of(scene);
+    const auto& bodies = solver.bodies();
+    if (found(facts, "time_step"))
+        return {"time_step", smaller_step(scene, facts, 0.9 * facts.dt_critical / facts.dt)};
+    if (found(facts, "separated") || found(facts, "contact_lost"))
+        return {"separation", wider_support(m)};
+    // points that fly too fast from the start, not such that something has thrown
+    const double courant = solver.point_motion().speed * facts.dt / lattice->cell_size;
+    if (courant > fast && !found(facts, "energy") && !found(facts, "volume"))
+        return {"time_step", smaller_step(scene, facts, fast / (2 * courant))};
+    // the last motion of a body that came to rest tells nothing of its stresses
+    if (!found(facts, "crossing") && checkerboard_share(*lattice, *nodes) > pattern_rules)
+        return {"null_mode", null_mode_remedy(scene, m)};
+    const double oscillation = stress_oscillation(bodies, *lattice);
+    const bool noise = found(facts, "noise");
+    if (m.is_mpm && !m.b_bar && nearly_incompressible && (noise || (m.linear && oscillation > oscillates)))
+        return {"locking", m.linear ? "mpm.strain=b_bar" : ""};
+    if (found(facts, "crossing"))
+        return {"crossing", wider_support(m)};
+    if (found(facts, "released"))
+        return {m.point_support || m.linear ? "crossing" : "separation", wider_support(m)};
+    if (found(facts, "mixed_cells"))
+        return {"mixed_cells", ""};
+    if (found(facts, "drift"))
+        return {"ratchet", smaller_step(scene, facts, 0.5)};
+    if (noise)
+        return {"null_mode", null_mode_remedy(scene, m)};
+    if (largest_volume_ratio(bodies) > grown)
+        return {"tension", m.point_support && scene.lpfdm.volume_cap == 0 ? "lpfdm.volume_cap=2.0" : ""};
+    if (m.usl)
+        return {"sliver", "mpm.scheme=musl"};
+    if (mass_of_fastest(*nodes, full_mass(bodies, lattice->cell_size)) < sliver_mass)
+        return {"sliver", sliver_remedy(scene, m)};
+    if ((m.point_support || m.linear) && oscillation > oscillates)
+        return {"crossing", wider_support(m)};
+    return {};
+}
+}  // namespace testbed

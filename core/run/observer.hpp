@@ -1,0 +1,92 @@
+#pragma once
+/// What is recorded of a run: the history of sums and probes, and snapshots of all points in the order of their ids.
+
+#include "core/bodies/plastic_work.hpp"
+#include "core/loads/node_ops.hpp"
+#include "core/run/guards.hpp"
+#include "core/run/results.hpp"
+#include "core/run/solver.hpp"
+
+#include <map>
+#include <optional>
+#include <span>
+
+namespace testbed
+{
+class Observer
+{
+public:
+    /// @throws SceneError when a probe has no points
+    Observer(const Scene& scene, const Solver& solver);
+
+    /// Adds one sample to the history, and returns it. @param dt of the coming step [s]
+    /// @param fresh whether the velocities of the points are looked at anew: that costs about a step
+    /// @throws Diverged for a value that is not finite
+    const GuardSample& sample(double t, double dt, bool fresh = true);
+    /// Kinetic energy at the half step before over strain energy.
+    static double kinetic_ratio(const Solver& solver);
+    void snapshot(ResultFile& file, double t, std::int64_t step);
+    void write_history(ResultFile& file) const;
+
+    double guard_seconds() const { return guard_seconds_; }  ///< spent on what the guards alone need
+    std::size_t snapshots() const { return snapshot_times_.size(); }
+    /// The file that shows the snapshots in ParaView. @param name of the HDF5 file, without folder
+    std::string xdmf(const std::string& name) const;
+
+private:
+    struct Series
+    {
+        std::string name, unit;
+        std::size_t columns = 1;
+        std::vector<double> values{};
+    };
+    struct Probe
+    {
+        std::string name;
+        std::vector<std::uint32_t> ids{};
+        std::vector<Vec2> initial{};
+        std::vector<Series> series{};
+    };
+    struct Exact
+    {
+        std::vector<Expression> displacement{}, stress{};
+    };
+    struct Location
+    {
+        std::uint32_t body, point;
+    };
+
+    std::vector<Location> locations() const;
+    Place place(const Location& at, const Vec2& initial, double t) const;
+    std::array<double, 6> stress(const Location& at) const;
+    std::array<double, 6> exact_stress(const Place& at) const;
+    std::array<double, 3> exact_displacement(const Place& at) const;
+    /// The work of gravity on the points up to time t [J/m].
+    double gravity_work(double t, const Vec2& moment);
+    void write_ledger(const GuardSample& sample);
+    void sample_probes(double t);
+    void sample_restraints();
+    /// Adds a row to the series of that name.
+    static void add(std::vector<Series>& list, const std::string& name, const char* unit, std::span<const double> row);
+    static void add(std::vector<Series>& list, const std::string& name, const char* unit, double value)
+    {
+        add(list, name, unit, {&value, 1});
+    }
+
+    const Scene& scene_;
+    const Solver& solver_;
+    Exact exact_;
+    std::optional<Gravity> gravity_;
+    std::vector<Series> history_;
+    std::map<std::string, std::vector<Series>> supports_;
+    std::vector<Probe> probes_;
+    std::vector<double> snapshot_times_;
+    std::vector<std::vector<std::pair<std::string, std::size_t>>> snapshot_fields_;  ///< of each snapshot, with their columns
+    Lattice lattice_;
+    Ledger ledger_;
+    PlasticWork plastic_;
+    GuardSample last_;
+    double gravity_work_ = 0, gravity_work_error_ = 0, last_time_ = 0, guard_seconds_ = 0;
+    Vec2 last_moment_;
+};
+}  // namespace testbed

@@ -1,0 +1,266 @@
+"""Maps over the points: a field, or stripes of the initial position that show the motion."""
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.patches import Rectangle
+
+from ..grade import components
+from ..grade.components import of_snapshot
+from ..read.spelling import did_you_mean
+from .drawing import (Drawing, FigureError, axis_scale, by_series, chosen, one_size, snapshot_of, where_of_title, with_result,
+                      with_unit)
+from .style import WIDTH, plt
+
+SAND = ("#E3CD9B", "#7A5C36")  # light and dark stripes
+INCLUSION, OUTLINE, WALL = "0.62", "0.1", "0.45"
+OVERLAP = 1.25  # of the squares that close the gaps between stretched neighbours
+LEFT, RIGHT, TOP, BOTTOM = 0.5, 1.0, 0.28, 0.42  # inches about the panels
+TALLEST = 2.6  # panel, inches
+
+
+@dataclass
+class Layer:
+    """One quantity over all panels: `data` (N,) in the unit shown or RGB (N, 3), per row and panel (None: no such field)."""
+    title: str
+    data: list
+    low: float = 0.0
+    high: float = 1.0
+    cmap: str = ""
+
+
+def _squares(snapshot, scale=1.0):
+    """Corners (N, 4, 2) of squares with each point's current area times scale^2, about its current position."""
+    centre = snapshot["position"][:, :2]
+    area = snapshot["volume"] if "volume" in snapshot else snapshot["initial_volume"]
+    half = 0.5 * scale * np.sqrt(np.clip(np.nan_to_num(area), 0.0, None))
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
+    return centre[:, None, :] + half[:, None, None] * corners[None]
+
+
+def _inclusions(snapshot, entry):
+    """(N,) True for points of bodies other than the first, when they are to be told apart."""
+    count = len(snapshot["position"])
+    if not entry.get("inclusions", True) or "body" not in snapshot:
+        return np.zeros(count, bool)
+    return snapshot["body"] > snapshot["body"].min()
+
+
+def _limits(values, component, given=None):
+    """(low, high, map): 1st to 99th percentile; a diverging map about zero when both signs occur, zero below for a strain."""
+    if given:
+        return given[0], given[1], "RdBu_r" if given[0] < 0 < given[1] else "viridis"
+    finite = np.concatenate(values)
+    finite = finite[np.isfinite(finite)]
+    if not len(finite):
+        return 0.0, 1.0, "viridis"
+    low, high = np.percentile(finite, [1, 99])
+    if component == "plastic_shear_strain":
+        low = 0.0
+    if low < 0 < high and min(-low, high) > 0.1 * max(-low, high):
+        bound = max(-low, high)
+        return -bound, bound, "RdBu_r"
+    return (low, high, "viridis") if high > low else (low - 0.5, high + 0.5, "viridis")
+
+
+def _unit(data, base):
+    """(unit, factor) in which the 99th percentile of the data reads well."""
+    return axis_scale([np.percentile(np.abs(d[np.isfinite(d)]), 99) if np.isfinite(d).any() else [0.0] for d in data], base)
+
+
+def _field_layers(rows, entry):
+    """The values of a component, and the errors where an exact solution is there."""
+    component = entry["component"]
+    name = components.split(component)[0]
+    base = rows[0][0][2].unit(name) or components.default_unit(name)
+    values = [[of_snapshot(s, component) for _, _, s in row] for row in rows]
+    soil = [v[~_inclusions(s, entry)] for row, own in zip(rows, values) for v, (_, _, s) in zip(own, row)]
+    unit, factor = _unit(soil, base)
+    limits = _limits([v * factor for v in soil], component, entry.get("range"))
+    layers = [Layer(with_unit(components.symbol(component), unit), [[v * factor for v in own] for own in values], *limits)]
+    errors = [[v - of_snapshot(s, component, True) if components.has_exact(s, component) else None
+               for v, (_, _, s) in zip(own, row)] for row, own in zip(rows, values)]
+    present = [e for own in errors for e in own if e is not None]
+    if entry.get("error", True) and present:
+        unit, factor = _unit(present, base)
+        low, high, _ = _limits([e * factor for e in present], component)
+        bound = max(abs(low), abs(high)) or 1.0
+        title = with_unit(f"Error of {components.symbol(component).split(' ')[-1]}", unit)
+        layers.append(Layer(title, [[None if e is None else e * factor for e in own] for own in errors], -bound, bound, "PuOr"))
+    return layers
+
+
+def _stripe(across, h):
+    """Default width of a stripe: whole points, about a sixth of the narrow side (`across`), without a rest if some number nearby allows."""
+    points = max(1, round(across / h))
+    even = [k for k in range(math.ceil(points / 8), points // 4 + 1) if points % k == 0]
+    return h * (min(even, key=lambda k: abs(points / k - 6)) if even else max(1, round(points / 6)))
+
+
+def _stripes(snapshot, entry):
+    """RGB (N, 3): a checker or strata of the initial position."""
+    X = snapshot["initial_position"][:, :2]
+    h = math.sqrt(np.median(snapshot["initial_volume"]))
+    corner, extent = X.min(axis=0) - h / 2, np.ptp(X, axis=0) + h
+    spacing = entry.get("spacing", _stripe(extent.min(), h))
+    index = np.floor((X - corner) / spacing * (1 + 1e-9)).astype(int)
+    number = index[:, 1] if entry.get("pattern", "checker") == "strata" else index.sum(axis=1)
+    light, dark = (np.array([int(c[k:k + 2], 16) / 255 for k in (1, 3, 5)]) for c in SAND)
+    return np.where((number % 2 == 0)[:, None], light, dark)
+
+
+def _draw_points(axis, snapshot, data, layer, entry):
+    """Squares of the points, larger ones below so that stretched neighbours leave no gaps; inclusions grey and outlined."""
+    grey = _inclusions(snapshot, entry)
+    for order, scale in enumerate((OVERLAP, 1.0)):
+        squares = _squares(snapshot, scale)[~grey]
+        look = {"array": data[~grey], "cmap": layer.cmap, "clim": (layer.low, layer.high)} if layer.cmap else \
+            {"facecolors": data[~grey]}
+        mapped = axis.add_collection(PolyCollection(squares, linewidths=0, antialiased=False, rasterized=True,
+                                                    zorder=1 + 0.1 * order, **look))
+    for order, (scale, colour) in enumerate(((1.6, OUTLINE), (1.15, INCLUSION))):
+        if grey.any():
+            axis.add_collection(PolyCollection(_squares(snapshot, scale)[grey], facecolors=colour, linewidths=0, antialiased=False,
+                                               rasterized=True, zorder=1.3 + 0.1 * order))
+    return mapped
+
+
+def _walls(snapshot):
+    """[(low corner (2,), high corner (2,))] of the scene's walls at the time of a snapshot."""
+    result, boxes = snapshot.result, []
+    for wall in result.resolved.get("wall", []):
+        try:
+            low, high = (np.array(wall[key], dtype=float)[:2] for key in ("min", "max"))
+        except (KeyError, TypeError, ValueError):
+            continue
+        if wall.get("name") in result.supports and result.has(f"history/supports/{wall['name']}/displacement"):
+            moved, time = result.support(wall["name"], "displacement"), result.history("time")
+            shift = np.array([np.interp(snapshot.time, time, moved[:, k]) for k in range(2)])
+            low, high = low + shift, high + shift
+        door = wall.get("door") if snapshot.time >= wall.get("door_opens", 0.0) else None
+        if door:  # an opening along the longer side
+            along = np.arange(2) == np.argmax(high - low)
+            boxes += [(low, np.where(along, door[0], high)), (np.where(along, door[1], low), high)]
+        else:
+            boxes.append((low, high))
+    return boxes
+
+
+def _draw_walls(axis, snapshot, view):
+    for low, high in _walls(snapshot):
+        low, high = np.clip(low, view[0] - 1, view[1] + 1), np.clip(high, view[0] - 1, view[1] + 1)
+        axis.add_patch(Rectangle(low, *(high - low), facecolor="0.93", edgecolor=WALL, hatch="/////", linewidth=0.6, zorder=0.5))
+
+
+def _draw_curves(axis, snapshot, names):
+    """Reference curves of the scene, such as a measured surface."""
+    known = snapshot.result.curves
+    for name, line in zip(names, itertools.cycle(("--", "-.", ":"))):
+        if name not in known:
+            raise FigureError(f"the scene has no [[report.curve]] '{name}'{did_you_mean(name, known)}")
+        axis.plot(*known[name], color="black", linestyle=line, linewidth=1.0, zorder=3)
+
+
+def _view(snapshots):
+    """Corners (2,), (2,) of what is shown: all points but for the farthest thousandth, with a margin."""
+    every = np.concatenate([_squares(s).reshape(-1, 2) for s in snapshots])
+    every = every[np.isfinite(every).all(axis=1)]
+    if not len(every):
+        raise FigureError("no point has a finite position")
+    low, high = np.percentile(every, 0.1, axis=0), np.percentile(every, 99.9, axis=0)
+    pad = (0.05 if any(_walls(s) for s in snapshots) else 0.03) * max(high - low)
+    return low - pad, high + pad
+
+
+def _bar(figure, mapped, layer, box):
+    """The colour bar in a box (x, y, height) of inches."""
+    width, total = figure.get_size_inches()
+    bar = figure.add_axes([box[0] / width, box[1] / total, 0.09 / width, box[2] / total])
+    colours = figure.colorbar(mapped, cax=bar, extend="both")
+    colours.outline.set_linewidth(0.4)
+    colours.ax.locator_params(nbins=max(2, min(6, int(box[2] / 0.3))))
+    colours.set_label(layer.title)
+
+
+def _scale_axes(axis, view, width, height):
+    """True to scale, with ticks for a panel of so many inches."""
+    axis.set_xlim(view[0][0], view[1][0])
+    axis.set_ylim(view[0][1], view[1][1])
+    axis.set_aspect("equal")
+    if width < 0.4:  # room for one number
+        axis.set_xticks([0.0 if view[0][0] <= 0 <= view[1][0] else view[0][0]])
+    else:
+        axis.locator_params(axis="x", nbins=2 if width < 0.8 else 4)
+    axis.locator_params(axis="y", nbins=max(2, min(6, int(height / 0.35))))
+
+
+def field_maps(study, entry, style):
+    """Panels: variants across, snapshots down; errors, where there are any, below the values."""
+    notes, stripes = [], entry.get("deformed_grid", False)
+    runs = with_result(one_size(chosen(study, entry), entry), notes, completed=not entry.get("unfinished"))
+    series = [(label, run) for label, own in by_series(runs, entry, style).items() for run in own]
+    wanted = entry.get("snapshot", -1)
+    wanted = wanted if isinstance(wanted, list) else [wanted]
+    rows = [[(label, run, snapshot_of(run, index)) for label, run in series] for index in wanted]
+    snapshots = [s for row in rows for _, _, s in row]
+    layers = [Layer("", [[_stripes(s, entry) for _, _, s in row] for row in rows])] if stripes else _field_layers(rows, entry)
+    view = _view(snapshots)
+    ratio = (view[1] - view[0])[1] / (view[1] - view[0])[0]
+
+    width, right = WIDTH[entry.get("width", "page")], 0.15 if stripes else RIGHT
+    left = LEFT + (0.18 if len(rows) > 1 else 0.0)  # times beside the rows
+    gap, room = 0.12, width - left - right
+    most = max(1, int(room / (1.5 if ratio < 1 / 1.3 else 0.8)))
+    columns = min(entry.get("columns", most), len(series), max(1, int(room / 0.8)))
+    bands = math.ceil(len(series) / columns)
+    if "columns" not in entry:
+        columns = math.ceil(len(series) / bands)  # rows of like length
+    panel = (room - (columns - 1) * gap) / columns
+    height = panel * ratio
+    if height > TALLEST:  # tall and narrow bodies
+        height, panel = TALLEST, TALLEST / ratio
+        spread = (room - columns * panel) / max(1, columns - 1) if columns > 1 else 0
+        gap = min(spread, 0.45)
+    step, lines = height + TOP, bands * len(rows)
+    total = lines * len(layers) * step + BOTTOM + 0.02
+    longest = max(len(label) for label, _ in series) * 0.07
+    edge = left + columns * panel + (columns - 1) * gap + 0.12 + min(max(0.0, (longest - panel) / 2), 0.3)  # of a long title
+    width = min(width, edge + right - 0.12)
+    figure = plt.figure(figsize=(width, total))
+    for number, layer in enumerate(layers):
+        mapped = None
+        for line, row in enumerate(rows):
+            time = where_of_title([s for _, _, s in row]).removeprefix("At ")
+            for k, (label, _, snapshot) in enumerate(row):
+                place = number * lines + line * bands + k // columns
+                axis = figure.add_axes([(left + (k % columns) * (panel + gap)) / width, (total - (place + 1) * step) / total,
+                                        panel / width, height / total])
+                if layer.data[line][k] is not None:
+                    mapped = _draw_points(axis, snapshot, layer.data[line][k], layer, entry)
+                _draw_walls(axis, snapshot, view)
+                _draw_curves(axis, snapshot, entry.get("curves", []))
+                _scale_axes(axis, view, panel, height)
+                axis.set_title(label, pad=3, fontsize=8 if len(label) * 0.07 < panel + gap else 6)
+                if k % columns:
+                    axis.tick_params(labelleft=False)
+                else:
+                    letter = f"({chr(ord('a') + line)}) {time}\n" if len(rows) > 1 else ""
+                    axis.set_ylabel(letter + "$y$ [m]")
+                if number == len(layers) - 1 and line == len(rows) - 1 and k + columns >= len(series):
+                    axis.set_xlabel("$x$ [m]")
+                else:
+                    axis.tick_params(labelbottom=False)
+        if mapped is not None and layer.cmap:
+            room, long = lines * step - TOP, min(lines * step - TOP, 3.0)
+            _bar(figure, mapped, layer, (edge, total - (number + 1) * lines * step + (room - long) / 2, long))
+    if len(rows) == 1:
+        notes.insert(0, where_of_title(snapshots))
+    if not stripes and "range" not in entry:
+        notes.append("Colours span the 1st to 99th percentile")
+    if entry.get("curves"):
+        notes.append(f"Broken lines: reference {', '.join(entry['curves'])}".replace("_", " "))
+    if any(_inclusions(s, entry).any() for s in snapshots):
+        notes.append("Other bodies than the first are grey")
+    return Drawing(figure, [run for _, run in series], [n for n in dict.fromkeys(notes) if n])

@@ -1,0 +1,183 @@
+"""Error against cost: what accuracy a method buys for how many seconds or unknowns, and which buys it cheapest."""
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
+
+from ..grade import metrics
+from ..grade.targets import number
+from .drawing import Drawing, FigureError, by_series, chosen, log_y, name_of, rails
+from .style import RAIL, WIDTH, frame, legend_below, legend_shape
+
+AXES = {"solve_s": "Solve time [s]", "dofs": "Degrees of freedom"}
+ACCURACIES = (0.01, 0.001)
+
+
+@dataclass
+class Cost:
+    """One setting of a method: its error, the mean over repeats, and what it costs: the median time and its range."""
+    L: float
+    settings: dict
+    error: float
+    solve_s: float
+    least_s: float
+    most_s: float
+    dofs: float
+    busy: bool
+
+
+def error_of(run, entry):
+    """The error of a run; with the key 'exact' the relative distance of a measured quantity from it. nan when there is none."""
+    value = run.value(entry["quantity"], entry.get("norm", ""))
+    return abs(value / entry["exact"] - 1.0) if "exact" in entry else abs(value)
+
+
+def is_busy(run, cores):
+    """Whether the load average at the start of a run was above the number of cores."""
+    load = run.result.provenance.get("load_average")
+    return bool(cores and isinstance(load, (int, float)) and load > cores)
+
+
+def costs_of(runs, entry, cores=None):
+    """([Cost], [runs without a number]) of the runs of one series, repeats taken together."""
+    found, lost = {}, []
+    for run in runs:
+        error, seconds = error_of(run, entry), run.value("solve_s")
+        if run.completed and math.isfinite(error) and seconds > 0:  # an error of zero is exact, not lost
+            key = tuple((k, str(v)) for k, v in run.values.items() if k not in ("repeat", "dt"))
+            found.setdefault(key, []).append((run, max(error, np.finfo(float).tiny), seconds))
+        else:
+            lost.append(run)
+    costs = []
+    for same in found.values():
+        values = same[0][0].values
+        settings = {k: v for k, v in values.items() if k not in ("repeat", "dt", "L", "grid.cell_size", "case", "scene", "method", "variant", "seed")}
+        times = [seconds for _, _, seconds in same]
+        costs.append(Cost(values.get("L"), settings, float(np.mean([error for _, error, _ in same])), float(np.median(times)), min(times), max(times),
+                          float(same[0][0].result.performance.get("dofs", math.nan)), any(is_busy(run, cores) for run, _, _ in same)))
+    return sorted(costs, key=lambda c: (-(c.L or 0), c.solve_s)), lost
+
+
+def front(points):
+    """Those of the points (x, y) that no other beats in both, by x."""
+    best, kept = math.inf, []
+    for x, y in sorted(points):
+        if y < best:
+            kept.append((x, y))
+            best = y
+    return kept
+
+
+def work_precision(study, entry, style):
+    """Error against seconds or unknowns, or seconds against unknowns. Where a method ran with several settings at one cell size, all are
+    shown and its line joins those that nothing of its own beats (against unknowns: the fastest)."""
+    x, y = entry.get("x", "solve_s"), entry.get("y", "error")
+    runs, notes = chosen(study, entry), []
+    series, failing = {}, {}
+    for label, own in by_series(runs, entry, style).items():
+        series[label], lost = costs_of(own, entry, study.plan.get("cores"))
+        at = [run.value("solve_s") if x == "solve_s" else float(run.result.performance.get("dofs", math.nan)) for run in lost if run.result]
+        if at := sorted({a for a in at if a > 0}):
+            failing[label] = at
+        if without := sum(run.result is None for run in own):
+            notes.append(f"{label}: {without} of {len(own)} runs have no result")
+    if not any(series.values()):
+        raise FigureError(f"no completed run has {entry['quantity']} {entry.get('norm', '')}".rstrip() + " and a solve time")
+    is_error = y == "error" and ("exact" in entry or metrics.is_error(entry["quantity"], entry.get("norm", "")))
+    exact = {label for label, costs in series.items() if is_error and costs and all(c.error < metrics.ROUNDING for c in costs)}
+    exact = set() if len(exact) == sum(bool(costs) for costs in series.values()) else exact
+    of = {label: [(getattr(c, x), getattr(c, y)) for c in costs] for label, costs in series.items()}
+    texts = {label: f"{label}: exact (≤ {number(max(c.error for c in series[label]))})" if label in exact else label for label in series}
+    width = WIDTH[entry.get("width", "column")]
+    columns, rows = legend_shape(texts.values(), width)
+    figure, axes = frame(width, 2.3, rows, rails=len(failing), left=0.62, right=0.12)
+    axis, handles = axes[0, 0], []
+    everything = [p for label, points in of.items() if label not in exact for p in points]
+    if y == "error":
+        best = front(everything + [p for label in exact for p in of[label]])
+        best = [p for p in best if p[1] > metrics.ROUNDING or not is_error]
+        if best:
+            axis.plot(*zip(*best), color="0.82", linewidth=5.0, solid_capstyle="round", zorder=0)
+        notes.append("The broad line is the Pareto front of all methods")
+    for label, costs in series.items():
+        handles.append(Line2D([], [], **style.of(label), label=texts[label]))
+        look = style.of(label)
+        if label in exact:
+            axis.plot([p[0] for p in of[label]], [0.0] * len(costs), transform=axis.get_xaxis_transform(), linestyle="none",
+                      marker=style.marker(label), markersize=4.5, markerfacecolor="white", markeredgecolor=style.colour(label), clip_on=False, zorder=5)
+            continue
+        if not costs:
+            continue
+        several = len({c.L for c in costs}) < len(costs)
+        fastest = [min((c for c in costs if c.L == size), key=lambda c: c.solve_s) for size in {c.L for c in costs}]
+        line = front(of[label]) if several and y == "error" else sorted((getattr(c, x), getattr(c, y)) for c in fastest)
+        if several:
+            axis.plot(*zip(*of[label]), **{**look, "linestyle": "none", "markersize": 2.5, "alpha": 0.45})
+        axis.plot(*zip(*line), **look)
+        if x == "solve_s" and not several:
+            data = np.array([(c.solve_s, c.error, c.solve_s - c.least_s, c.most_s - c.solve_s) for c in costs]).T
+            axis.errorbar(data[0], data[1], xerr=data[2:], color=look["color"], linestyle="none", elinewidth=0.7, capsize=1.8)
+        if any(c.busy for c in costs):
+            axis.plot(*zip(*[p for p, c in zip(of[label], costs) if c.busy]), linestyle="none", marker="o", markersize=6, markerfacecolor="none",
+                      markeredgecolor="0.7", markeredgewidth=0.5, zorder=1)
+    if any(c.busy for costs in series.values() for c in costs):
+        notes.append("Circled: timed on a busy machine")
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    low, high = min(p[1] for p in everything), max(p[1] for p in everything)
+    if is_error:  # a method that diverges must not flatten the picture
+        coarsest = max(c.L or 0 for costs in series.values() for c in costs)
+        cap = 10 * max((c.error for label, costs in series.items() for c in costs if label not in exact and (c.L or 0) >= coarsest / 1.001), default=high)
+        if high > 1.6 * cap:
+            notes.append("Errors above the upper edge are off the scale")
+        high = min(high, cap)
+    log_y(axis, low / 1.6, high * 1.6)
+    every = [p[0] for points in of.values() for p in points] + [a for at in failing.values() for a in at]
+    if x == "solve_s":
+        every += [t for costs in series.values() for c in costs for t in (c.least_s, c.most_s)]
+    axis.set_xlim(min(every) / 1.5, max(every) * 1.5)
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlabel(AXES[x])
+    axis.set_ylabel(AXES["solve_s"] if y == "solve_s" else
+                    f"Error of {name_of(entry['quantity'], entry.get('norm', '')).lower()}" if "exact" in entry else
+                    name_of(entry["quantity"], entry.get("norm", "")))
+    rails(axis, failing, style, "failed")
+    legend_below(figure, handles, columns)
+    if exact:
+        notes.append("Methods that are exact to rounding stand on the lower edge")
+    if "solve_s" in (x, y):
+        notes.insert(0, "Medians of repeats" + ("" if any(len({c.L for c in costs}) < len(costs) for costs in series.values()) or x != "solve_s"
+                                                else " with their range") + "; set-up and output are left out")
+    return Drawing(figure, runs, notes)
+
+
+def cheapest(costs, accuracy):
+    """The fastest setting whose error is at most `accuracy`; None when there is none."""
+    return min((c for c in costs if c.error <= accuracy), key=lambda c: c.solve_s, default=None)
+
+
+def reach(study, entry):
+    """(header, rows, notes) of 'which method reaches 1 % and 0.1 %, with which L, in how long' for one figure of error against time."""
+    runs = study.select(entry["where"])
+    series = {}
+    for run in runs:
+        series.setdefault(run.name, []).append(run)
+    header, rows = ["variant"], []
+    for accuracy in ACCURACIES:
+        header += [f"{100 * accuracy:g} %: L [m]", "settings", "solve [s]", "× fastest"]
+    found = {label: costs_of(own, entry, study.plan.get("cores"))[0] for label, own in series.items()}
+    fastest = {a: min((c.solve_s for costs in found.values() if (c := cheapest(costs, a))), default=math.nan) for a in ACCURACIES}
+    for label, costs in found.items():
+        row = [label]
+        for accuracy in ACCURACIES:
+            best = cheapest(costs, accuracy)
+            if best is None:
+                least = min((c.error for c in costs), default=math.nan)
+                row += ["not reached", f"best {number(100 * least, 2)} %" if math.isfinite(least) else "no number", "", ""]
+                continue
+            settings = ", ".join(f"{k.rsplit('.', 1)[-1]} {v:g}" for k, v in best.settings.items() if isinstance(v, (int, float)) and k != "constants.ppc")
+            row += [f"{best.L:g}", settings, f"{best.solve_s:.3g}" + (" busy" if best.busy else ""), f"{best.solve_s / fastest[accuracy]:.1f}"]
+        rows.append(row)
+    return header, rows, ["The fastest of the runs whose error is at most the one asked; no interpolation between them. Solve time: median of repeats."]

@@ -1,0 +1,203 @@
+"""A study's folder in memory: its runs, their results and their rows of metrics."""
+import csv
+import io
+import json
+import math
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..read.results import Result, ResultError
+from ..read.study_file import StudyError, matches, read_study
+from . import metrics
+from .limits import find_limits
+from .verdicts import judge_study
+
+CSV_COLUMNS = ("run_id", "case", "method", "variant", "L", "ppc", "dt", "seed", "quantity", "norm", "value",
+               "solve_s", "particle_steps", "status", "soundness", "cause", "remedy")
+PLAN = "plan.json"
+
+
+@dataclass
+class Run:
+    """One run of a study. `values` holds what a `where` may ask for; `result` is None when there is no usable file."""
+    id: str
+    folder: Path
+    values: dict
+    status: str
+    reason: str = ""
+    result: Result | None = None
+    rows: dict = field(default_factory=dict)
+    errors: list = field(default_factory=list)
+    command: str = ""  # that makes it again
+    search: str = ""  # what is common to the runs of one bisection
+    verdict: object = None  # of a study with cases
+
+    @property
+    def completed(self):
+        return self.status == "completed"
+
+    @property
+    def name(self):
+        return self.values.get("variant") or self.id
+
+    @property
+    def suspect(self):
+        """Completed, and its guards say that the answer may be wrong."""
+        return self.completed and self.result is not None and self.result.soundness.startswith("suspect")
+
+    @property
+    def label(self):
+        """How it ended: the status, or 'suspect: CODE, ...'."""
+        return self.result.soundness if self.suspect else self.status
+
+    @property
+    def told(self):
+        """The reason, what the guards say, and what would help, as one text."""
+        if self.result is None:
+            return self.reason
+        parts = [self.reason, *self.result.suspect]
+        if self.result.cause:
+            parts.append(f"cause: {self.result.cause}" + (f", remedy: {self.result.remedy}" if self.result.remedy else ""))
+        return "; ".join(part for part in parts if part)
+
+    def value(self, quantity, norm=""):
+        """The metric, nan when the run has none."""
+        return self.rows.get((quantity, norm), math.nan)
+
+
+@dataclass
+class Study:
+    """A study's folder: the study file, the runs of its present plan, and the combinations left out."""
+    folder: Path
+    spec: object
+    plan: dict
+    runs: list
+    left_out: list
+    limits: list = field(default_factory=list)  # found by searches
+
+    def case(self, name):
+        """The [[case]] of that name."""
+        return next(case for case in self.spec.cases if case.name == name)
+
+    @property
+    def name(self):
+        return self.folder.name
+
+    def select(self, where):
+        return [run for run in self.runs if matches(run.values, where)]
+
+    def variants(self):
+        return list(dict.fromkeys(run.name for run in self.runs))
+
+
+# What makes no line of its own in a table or an order.
+NO_SERIES = ("scene", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "grid.cell_size")
+
+
+def groups(runs, leave_out=()):
+    """Runs by variant, and within by further axes than method, cell size and repeats, as labels."""
+    further = [k for run in runs for k in run.values
+               if k not in NO_SERIES and k not in leave_out and not k.endswith(".seed")]
+    varying = [k for k in dict.fromkeys(further) if len({str(r.values[k]) for r in runs if k in r.values}) > 1]
+    found = {}
+    for run in runs:
+        parts = [run.name] + [f"{k.rsplit('.', 1)[-1]} = {run.values.get(k)}" for k in varying]
+        found.setdefault(", ".join(parts), []).append(run)
+    return found
+
+
+def write_atomically(path, text):
+    """Writes a whole file or none."""
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, path)
+
+
+def read_run(folder, entry):
+    """A run from its folder; never raises for a bad file, but says so in `reason`."""
+    folder = Path(folder)
+    values = {**entry.get("axes", {}), "repeat": entry.get("repeat", 1)}
+    for key in ("case", "method", "variant", "L", "ppc", "seed"):
+        if entry.get(key) not in (None, ""):
+            values[key] = entry[key]
+    run = Run(entry["id"], folder, values, "missing", entry.get("outcome", "") or "not run yet", command=entry.get("command", ""),
+              search=entry.get("search", ""))
+    path = folder / "result.h5"
+    if not path.is_file():
+        return run
+    try:
+        result = Result(path)
+        values.update(case=entry.get("case") or result.case, method=result.method, variant=result.variant, L=result.cell_size,
+                      ppc=result.scene.get("points_per_cell", ""), dt=result.performance.get("dt", ""),
+                      seed=result.seed)
+    except ResultError as error:
+        run.status, run.reason = "unreadable", str(error).replace(str(folder) + os.sep, "")
+        return run
+    run.result, run.status, run.reason = result, result.status, result.reason
+    grades = metrics.grade(result)
+    run.rows, run.errors = grades.rows, grades.errors
+    return run
+
+
+def _check_plan(path, plan):
+    """Raises StudyError when a plan is not what `testbed study` writes."""
+    lists = [plan.get(key, []) for key in ("runs", "left_out")] if isinstance(plan, dict) else [None]
+    if not all(isinstance(entries, list) and all(isinstance(e, dict) and isinstance(e.get("axes", {}), dict) for e in entries)
+               for entries in lists):
+        raise StudyError(f"{path}: is no plan of a study")
+    if not all(isinstance(entry.get("id"), str) for entry in plan.get("runs", [])):
+        raise StudyError(f"{path}: a run has no 'id'")
+
+
+def read_plan(folder):
+    """plan.json of a study's folder; without one, every folder under runs/."""
+    path = Path(folder) / PLAN
+    if path.is_file():
+        try:
+            plan = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError) as error:
+            raise StudyError(f"{path}: cannot be read: {error}") from error
+        _check_plan(path, plan)
+        return plan
+    runs = sorted(p.name for p in (Path(folder) / "runs").glob("*") if p.is_dir())
+    return {"runs": [{"id": name} for name in runs], "left_out": []}
+
+
+def read_study_folder(folder):
+    """A study's folder, graded. Raises StudyError when the study file or the plan is unusable."""
+    folder = Path(folder)
+    spec, plan = read_study(folder / "study.toml", need_scene=False), read_plan(folder)
+    runs = [read_run(folder / "runs" / entry["id"], entry) for entry in plan.get("runs", [])]
+    study = Study(folder, spec, plan, runs, plan.get("left_out", []))
+    if spec.cases:
+        judge_study(study)
+        study.limits = find_limits(study)
+    return study
+
+
+def _number(value):
+    return repr(float(value)) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+
+
+def _count(value):
+    return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else value
+
+
+def metrics_csv(runs):
+    """metrics.csv of the runs that have a finished result, as text."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(CSV_COLUMNS)
+    for run in runs:
+        if run.result is None or not run.result.finished:
+            continue
+        performance = run.result.performance
+        for (quantity, norm), value in run.rows.items():
+            writer.writerow([run.id, run.values["case"], run.result.method, run.result.variant,
+                             _number(run.values["L"]), run.values["ppc"], _number(run.values["dt"]),
+                             run.values["seed"], quantity, norm, repr(float(value)),
+                             _number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")),
+                             run.status, run.result.soundness, run.result.cause, run.result.remedy])
+    return out.getvalue()

@@ -1,0 +1,171 @@
+"""The tables of a study."""
+import math
+import statistics
+
+import numpy as np
+
+from ..draw.table import Table
+from ..draw.work_precision import is_busy, reach
+from ..grade import metrics
+from ..grade.convergence import fit_order, fit_power, pairwise_orders
+from ..grade.dataset import groups
+from ..grade.targets import digits_of, mean_by_size, number, values_by_size
+
+
+def _range(values, digits=3):
+    """'median [min-max]' of finite values."""
+    values = [v for v in values if isinstance(v, (int, float)) and math.isfinite(v)]
+    if not values:
+        return "n/a"
+    middle = number(statistics.median(values), digits)
+    return middle if min(values) == max(values) else f"{middle} [{number(min(values), digits)}–{number(max(values), digits)}]"
+
+
+def _whole(value):
+    return str(int(value)) if isinstance(value, (int, float)) and math.isfinite(value) else "n/a"
+
+
+def pairs(study):
+    """(quantity, norm) that occur, in order, without the performance numbers."""
+    keys = dict.fromkeys(key for run in study.runs for key in run.rows)
+    return [key for key in keys if key[0] not in metrics.ALWAYS]
+
+
+def _ratio_note(runs):
+    ratios = [r.value("static", "kinetic_over_strain") for r in runs]
+    ratios = [r for r in ratios if math.isfinite(r)]
+    return [f"Largest kinetic/strain energy ratio of these runs: {number(max(ratios))}."] if ratios else []
+
+
+def convergence_table(study, quantity, norm):
+    """Rows: variants; per cell size the value and, for errors, the order from the size before. None for one size."""
+    series, ordered = groups(study.runs), metrics.is_error(quantity, norm)
+    data = {}
+    for label, runs in series.items():
+        if any((quantity, norm) in run.rows for run in runs) or any(not run.completed for run in runs):
+            size, mean, _ = mean_by_size(runs, quantity, norm)
+            data[label] = (size[::-1], mean[::-1], runs)
+    sizes = sorted({size for own, _, _ in data.values() for size in own}, reverse=True)
+    if len(sizes) < 2:
+        return None
+    header = ["variant"]
+    for k, size in enumerate(sizes):
+        header += [f"L = {size:g} m"] + (["order"] if ordered and k else [])
+    header += ["order of all"] if ordered else []
+    rows = []
+    for label, (own, mean, runs) in data.items():
+        # an error of rounding has no order
+        orders = np.where(mean > metrics.ROUNDING, pairwise_orders(own, mean), np.nan)
+        row = [label]
+        for k, size in enumerate(sizes):
+            at = np.flatnonzero(own == size)
+            value, order = (mean[at[0]], orders[at[0]]) if len(at) else (math.nan, math.nan)
+            status = next((r.status for r in runs if r.values.get("L") == size and not r.completed), None)
+            row.append(number(float(value), digits_of(quantity, norm)) if math.isfinite(value)
+                       else status or ("n/a" if len(at) else ""))
+            if ordered and k:
+                row.append(f"{order:.2f}" if math.isfinite(order) else "")
+        if ordered:
+            fit = fit_order(own, mean)
+            row.append(str(fit) if math.isfinite(fit.order) and np.nanmax(mean) > metrics.ROUNDING else "")
+        rows.append(row)
+    title = f"{quantity} {norm} against cell size".replace("_", " ")
+    notes = [] if quantity == "static" else _ratio_note(study.runs)
+    return Table(f"{quantity}_{norm}".strip("_"), title, header, rows, notes=notes)
+
+
+def power_law_table(study, quantity):
+    """a and q of quantity = a L^q with their 95 % intervals, fitted to every run: rows are variants and norms. None without a fit."""
+    norms, rows = [norm for name, norm in pairs(study) if name == quantity], []
+    for label, runs in groups(study.runs).items():
+        for norm in norms:
+            law = fit_power(*values_by_size(runs, quantity, norm))
+            if math.isfinite(law.q.order):
+                rows.append([label, norm, f"{law.q.order:.3f}", _interval(law.q.low, law.q.high, "{:.3f}".format), number(law.a, 4),
+                             _interval(law.a_low, law.a_high, lambda v: number(v, 4)), str(law.q.points)])
+    words = quantity.replace("_", " ")
+    return Table(f"power_law_{quantity}", f"{words} = a L^q", ["variant", "norm", "q", "95 % of q", "a", "95 % of a", "runs"], rows, 2,
+                 ["Least squares of the logarithms over all runs; a is the value at L = 1 m."]) if rows else None
+
+
+def _interval(low, high, text):
+    return f"[{text(low)}, {text(high)}]" if math.isfinite(low) else ""
+
+
+def values_tables(study):
+    """Every number of studies with one cell size, a table for each case: rows are variants, columns quantities."""
+    tables = []
+    for case in dict.fromkeys(run.values.get("case", "") for run in study.runs if run.rows):
+        series = {}
+        for label, runs in groups(study.runs, leave_out=("case",)).items():
+            own = [run for run in runs if run.values.get("case", case) == case]
+            if own:
+                series[label] = own
+        keys = [key for key in pairs(study) if any(key in run.rows for runs in series.values() for run in runs)]
+        rows = []
+        for label, runs in series.items():
+            row = [label]
+            for key in keys:
+                values = [run.value(*key) for run in runs]
+                row.append(_range(values, digits_of(*key))
+                           if any(map(math.isfinite, values)) else next((r.status for r in runs if not r.completed), "n/a"))
+            rows.append(row)
+        header = ["variant", *(" ".join(key).replace("_", " ").strip() for key in keys)]
+        title = f"Measured quantities: {case}".replace("_", " ").removesuffix(": ")
+        tables.append(Table(f"values_{case}".rstrip("_"), title, header, rows))
+    return tables
+
+
+def performance_table(study):
+    """Timings per variant and cell size; runs on a busy machine are marked."""
+    cores, rows, busy_any = study.plan.get("cores"), [], False
+    for label, runs in groups(study.runs).items():
+        for size in sorted({r.values.get("L") for r in runs if r.result is not None}, reverse=True):
+            own = [r for r in runs if r.values.get("L") == size and r.result is not None]
+            perf = [r.result.performance for r in own]
+            loads = [r.result.provenance.get("load_average") for r in own]
+            loads = [float(v) for v in loads if isinstance(v, (int, float))]
+            busy = any(is_busy(r, cores) for r in own)
+            busy_any = busy_any or busy
+            rows.append([label, f"{size:g}", _whole(perf[0].get("points")), _whole(perf[0].get("steps")),
+                         *(_range([p.get(k) for p in perf]) for k in ("solve_s", "setup_s", "output_s")),
+                         _range([p.get("particle_steps_per_second") for p in perf]),
+                         number(float(perf[0].get("bytes_per_point", math.nan))),
+                         (f"{max(loads):.2f}" if loads else "n/a") + (" busy" if busy else ""),
+                         ", ".join(dict.fromkeys(r.label for r in own if r.suspect or not r.completed))])
+    if not rows:
+        return None
+    notes = ["Medians of repeats [smallest–largest]; solve is the time of the steps alone."]
+    if study.plan.get("jobs", 1) > 1:
+        notes.append(f"Runs went {study.plan['jobs']} at a time: timings are those of a shared machine.")
+    if busy_any:
+        notes.append(f"busy: the load average at the start was above the {cores} cores.")
+    header = ["variant", "L [m]", "points", "steps", "solve [s]", "set-up [s]", "output [s]", "particle steps [1/s]",
+              "memory [B/point]", "load", "status"]
+    return Table("performance", "Performance", header, rows, notes=notes)
+
+
+def reach_table(study, entry):
+    """'To reach 1 %, 0.1 %: which method, which L, how long' for a figure of error against time."""
+    header, rows, notes = reach(study, entry)
+    what = entry.get("title") or f"{entry['quantity']} {entry.get('norm', '')}".replace("_", " ").strip()
+    return Table(f"reach_{entry.get('name') or entry['quantity']}", f"To reach an accuracy: {what[:1].lower() + what[1:]}", header, rows, notes=notes)
+
+
+def targets_table(verdicts):
+    return Table("targets", "Expectations", ["target", "asked", "measured", "verdict", "note", "source"],
+                 [[v.label, v.asked, v.measured, v.verdict, v.note, v.source] for v in verdicts], 6)
+
+
+def study_tables(study):
+    """All tables of a study but the targets."""
+    found = [convergence_table(study, *key) for key in pairs(study)]
+    tables = [t for t in found if t]
+    if not tables:
+        tables = values_tables(study)
+    asked = [entry["quantity"] for entry in study.spec.figures if entry["kind"] == "power_law"]
+    asked += [target["quantity"] for target in study.spec.targets if target["kind"].startswith("exponent")]
+    tables += [power_law_table(study, quantity) for quantity in dict.fromkeys(asked)] + [performance_table(study)]
+    tables += [reach_table(study, entry) for entry in study.spec.figures if entry["kind"] == "work_precision"
+               and entry.get("x", "solve_s") == "solve_s" and (("exact" in entry) or metrics.is_error(entry["quantity"], entry.get("norm", "")))]
+    return [table for table in tables if table]
