@@ -26,6 +26,8 @@ public:
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return elasticity_.restraints(displacement_, time_); }
     const char* kinematics() const override { return "small_strain"; }
+    void write_state(StateWriter& writer) override { state(writer); }
+    void read_state(StateReader& reader) override { state(reader); }
     /// The limit of a cell as large as the distance of nodes, without damping.
     double critical_time_step(const Scene& scene) override;
 
@@ -42,6 +44,17 @@ protected:
     /// Load less internal forces; held components are not out of balance.
     Vector imbalance() const;
     virtual std::size_t factor_bytes() const { return 0; }
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for (const auto& [name, unit, field] : {std::tuple{"displacement", "m", &displacement_},
+                                                {"velocity", "m/s", &velocity_},
+                                                {"acceleration", "m/s^2", &acceleration_},
+                                                {"load", "N/m", &load_}})
+            a.part(name, unit, field->size(), [&, f = field](std::size_t k) -> double& { return (*f)(static_cast<unsigned>(k)); });
+        a.value("started", "-", started_);
+        a.value("last_dt", "s", last_dt_);
+    }
 
     std::string path_;
     Lattice lattice_;

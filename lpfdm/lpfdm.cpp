@@ -150,6 +150,7 @@ public:
         return point_motion_of(bodies_, [&](std::size_t body, std::size_t p) { return Lpfdm::velocity(body, p); });
     }
     std::optional<NodalWork> work() const override { return node_ops_.work(nodes_, lag_); }
+    NodalWork* work_done() override { return &node_ops_.work_done(); }
     std::pair<const Lattice*, const Nodes*> nodes() const override { return {&grid_.lattice, &nodes_}; }
     const std::vector<Body>& bodies() const override { return bodies_; }
 

@@ -154,6 +154,7 @@ public:
         work.of_strain = options_.scheme != MpmSpec::Scheme::musl && !xpic_;
         return work;
     }
+    NodalWork* work_done() override { return &node_ops_.work_done(); }
     std::pair<const Lattice*, const Nodes*> nodes() const override { return {&lattice_, &nodes_}; }
     const std::vector<Body>& bodies() const override { return bodies_; }
     Vec2 velocity(std::size_t body, std::size_t p) const override { return {bodies_[body].points.vx[p], bodies_[body].points.vy[p]}; }

@@ -220,7 +220,7 @@ int run(int argc, char** argv)
     }
     if (run_command->parsed())
     {
-        const std::string method = load_scene(options.scene, options.method, options.overrides).scene.method;
+        const std::string method = load(options).scene.method;
         if (find_variant(method).family == Family::fem)
             become("testbed-fem", rest_of(argc, argv, 2));
         return static_cast<int>(run_scene(options, make_particle_solver));

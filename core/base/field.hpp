@@ -21,6 +21,21 @@ inline void make_room(std::vector<double>& workspace, std::size_t n)
         std::vector<double>(n).swap(workspace);
 }
 
+/// What result files show of a field.
+struct Output
+{
+    enum class When
+    {
+        never,
+        at_start,
+        always
+    };
+    When when = When::never;
+    std::string_view name{}, unit{};    ///< of the field, if empty
+    double (*value)(double) = nullptr;  ///< of what the field holds, if it is shown otherwise
+};
+inline constexpr Output shown_always{Output::When::always}, shown_at_start{Output::When::at_start};
+
 /// `count` values from place `from` to place `to`.
 struct Move
 {
@@ -31,10 +46,11 @@ template <class T>
 class Field
 {
 public:
-    constexpr Field(std::string_view name, std::string_view unit) : name_(name), unit_(unit) {}
+    constexpr Field(std::string_view name, std::string_view unit, Output output = {}) : name_(name), unit_(unit), output_(output) {}
 
     std::string_view name() const { return name_; }
     std::string_view unit() const { return unit_; }
+    const Output& output() const { return output_; }
     bool active() const { return !data_.empty(); }
     std::size_t bytes() const { return data_.capacity() * sizeof(T); }
 
@@ -68,6 +84,7 @@ public:
 
 private:
     std::string_view name_, unit_;
+    Output output_;
     std::vector<T> data_;
 };
 }  // namespace testbed

@@ -15,6 +15,13 @@ public:
     /// Adds the work since the last call, with the mean of both stresses; a point that has unloaded counts with less than it took.
     /// Returns the sum [J/m].
     double add(const std::vector<Body>& bodies);
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.column("shear", "-", last_, &Last::shear);
+        a.column("per_shear", "Pa", last_, &Last::per_shear);
+        a.value("total", "J/m", total_);
+    }
 
 private:
     struct Last

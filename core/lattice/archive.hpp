@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <functional>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -58,6 +59,20 @@ public:
     void vector(std::string_view name, std::string_view unit, Vec2& value)
     {
         self().part(name, unit, 2, [&](std::size_t k) -> double& { return value[k]; });
+    }
+    /// With a flag that says whether there is a value.
+    template <class T>
+    void optional(const std::string& name, std::string_view unit, std::optional<T>& value)
+    {
+        bool given = value.has_value();
+        T held = value.value_or(T{});
+        this->value(name + "_given", "-", given);
+        if constexpr (std::is_same_v<T, Vec2>)
+            vector(name, unit, held);
+        else
+            this->value(name, unit, held);
+        if constexpr (Derived::reads)
+            value = given ? std::optional<T>(held) : std::nullopt;
     }
     /// A list, or one member of each of its entries.
     template <class T, class Member = std::identity>
@@ -123,6 +138,24 @@ public:
         const std::span<const double> values = from_.of(next_++);
         for (std::size_t k = 0; k < count; ++k)
             get(k) = static_cast<std::remove_reference_t<decltype(get(k))>>(values[k]);
+    }
+
+    /// @throws std::logic_error if parts are left
+    void end() const
+    {
+        if (next_ < from_.parts.size())
+            throw std::logic_error(fmt::format("a state of another solver: nothing asks for its part '{}'", from_.parts[next_].name));
+    }
+    /// The parts that come next whose names begin with the present group, as many as there are; their names go without it.
+    std::vector<State::Part> coming() const
+    {
+        std::vector<State::Part> parts;
+        for (std::size_t n = next_; n < from_.parts.size() && from_.parts[n].name.starts_with(group_name()); ++n)
+        {
+            parts.push_back(from_.parts[n]);
+            parts.back().name.erase(0, group_name().size());
+        }
+        return parts;
     }
 
 private:

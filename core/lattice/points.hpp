@@ -4,6 +4,8 @@
 
 #include "core/base/field.hpp"
 
+#include <cmath>
+
 namespace testbed
 {
 struct Points
@@ -11,14 +13,16 @@ struct Points
     Field<double> x{"x", "m"}, y{"y", "m"};  ///< current position
     Field<double> X{"X", "m"}, Y{"Y", "m"};  ///< initial position, if a step needs it; else see the id
     Field<double> sxx{"stress_xx", "Pa"}, syy{"stress_yy", "Pa"}, sxy{"stress_xy", "Pa"};
-    Field<double> volume{"volume", "m^2"};                                              ///< current, per metre of thickness
-    Field<double> half_x{"half_width_x", "m"}, half_y{"half_width_y", "m"};             ///< the point's own box, if it has one
-    Field<double> vx{"velocity_x", "m/s"}, vy{"velocity_y", "m/s"};                     ///< MPM: the velocity lives on the points
-    Field<double> stiffness{"stiffness_ratio", "-"};                                    ///< E(X, Y) / E of the material
-    Field<double> szz{"stress_zz", "Pa"};                                               ///< if it does not follow from the others
-    Field<double> plastic_shear{"plastic_shear_strain", "-"};                           ///< accumulated
-    Field<double> softening_strain{"softening_strain", "-"};                            ///< nonlocal: what drives softening
-    Field<double> cohesion{"cohesion", "Pa"}, sin_friction{"sin_friction_angle", "-"};  ///< of the point, before softening
+    Field<double> volume{"volume", "m^2"};                                   ///< current, per metre of thickness
+    Field<double> half_x{"half_width_x", "m"}, half_y{"half_width_y", "m"};  ///< the point's own box, if it has one
+    Field<double> vx{"velocity_x", "m/s"}, vy{"velocity_y", "m/s"};          ///< MPM: the velocity lives on the points
+    Field<double> stiffness{"stiffness_ratio", "-"};                         ///< E(X, Y) / E of the material
+    Field<double> szz{"stress_zz", "Pa"};                                    ///< if it does not follow from the others
+    Field<double> plastic_shear{"plastic_shear_strain", "-", shown_always};  ///< accumulated
+    Field<double> softening_strain{"softening_strain", "-", shown_always};   ///< nonlocal: what drives softening
+    Field<double> cohesion{"cohesion", "Pa", shown_at_start};                ///< of the point, before softening
+    Field<double> sin_friction{
+        "sin_friction_angle", "-", {Output::When::at_start, "friction_angle", "rad", [](double sine) { return std::asin(sine); }}};
     Field<std::uint32_t> id{"id", "-"};
 
     std::size_t count = 0;

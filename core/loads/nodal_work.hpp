@@ -17,6 +17,17 @@ struct NodalWork
     double hourglass = 0;   ///< taken away by hourglass control
     bool of_strain = true;  ///< strain is that of the velocities before and after the kicks, so that internal() is the stresses' work
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("kick", "J/m", kick);
+        a.value("gravity", "J/m", gravity);
+        a.value("restraints", "J/m", restraints);
+        a.value("loads", "J/m", loads);
+        a.value("damping", "J/m", damping);
+        a.value("hourglass", "J/m", hourglass);
+    }
+
     /// Work done against the stresses: what the other forces do not give to the motion.
     double internal() const { return gravity + restraints + loads - damping - hourglass - kick; }
 };

@@ -162,6 +162,8 @@ public:
     void kick(Nodes& nodes, double dt);
     /// Work up to the time of the forces, `lag` seconds after that of the nodes' velocity.
     NodalWork work(const Nodes& nodes, double lag) const;
+    /// The sums up to the last kick, on which no step depends.
+    NodalWork& work_done() { return work_; }
     /// Of the walls: all else is as the scene says.
     template <class Archive>
     void state(Archive& a)

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
-#include <map>
 
 namespace testbed
 {
 namespace
 {
 /// Energy must not come from nowhere. It may be lost, as in any contact of points on a lattice.
-class EnergyGuard final : public Guard
+class EnergyGuard final : public Remembering<EnergyGuard>
 {
 public:
     /// Where the motion is that of nodes, their lumped masses hold more of it than the points do, and a share that changes as a body turns
@@ -38,6 +37,17 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("made", "J/m", made_);
+        a.value("most_plastic", "J/m", most_plastic_);
+        a.value("made_by_law", "J/m", made_by_law_);
+        a.value("scale", "J/m", scale_);
+        a.value("beside_nodes", "J/m", beside_nodes_);
+        a.optional("at_start", "J/m", at_start_);
+    }
+
 private:
     double made_ = 0, most_plastic_ = 0, made_by_law_ = 0, scale_ = 0;
     double beside_nodes_ = 0;           ///< kinetic energy of the points less that of the nodes, when last looked at
@@ -46,7 +56,7 @@ private:
 
 /// Energy that an elastic body without damping loses to the numbers: to motion and stress that the lattice does not resolve. Some of it is
 /// lost in any contact; of a run that lost much of it the motion tells nothing.
-class LossGuard final : public Guard
+class LossGuard final : public Remembering<LossGuard>
 {
 public:
     void watch(const GuardSample& s, const Solver&) override
@@ -63,12 +73,18 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("share", "-", share_);
+    }
+
 private:
     double share_ = 0;
 };
 
 /// The weight that nodes carry and the points that have it must fall alike.
-class GravityGuard final : public Guard
+class GravityGuard final : public Remembering<GravityGuard>
 {
 public:
     explicit GravityGuard(bool flows) : limit_(flows ? limits::gravity_work_flow : limits::gravity_work) {}
@@ -88,12 +104,19 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("apart", "J/m", apart_);
+        a.value("scale", "J/m", scale_);
+    }
+
 private:
     double limit_, apart_ = 0, scale_ = 0;
 };
 
 /// Control of hourglass patterns is no part of the body: what it takes must stay small beside the energy of the run.
-class HourglassGuard final : public Guard
+class HourglassGuard final : public Remembering<HourglassGuard>
 {
 public:
     void watch(const GuardSample& s, const Solver&) override { share_ = s.energy.hourglass / std::max(s.energy_scale, 1e-300); }
@@ -104,12 +127,18 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("share", "-", share_);
+    }
+
 private:
     double share_ = 0;
 };
 
 /// Where nothing acts from outside.
-class MomentumGuard final : public Guard
+class MomentumGuard final : public Remembering<MomentumGuard>
 {
 public:
     void watch(const GuardSample& s, const Solver&) override
@@ -127,6 +156,14 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.optional("at_start", "kg/s", at_start_);
+        a.value("change", "kg/s", change_);
+        a.value("scale", "kg/s", scale_);
+    }
+
 private:
     std::optional<Vec2> at_start_{};
     double change_ = 0, scale_ = 0;
@@ -134,7 +171,7 @@ private:
 
 /// The mean of an elastic body's oscillation under a constant weight must stay where it is: else the strains, which balance the weight, and
 /// the displacements have parted.
-class DriftGuard final : public Guard
+class DriftGuard final : public Remembering<DriftGuard>
 {
 public:
     explicit DriftGuard(const GravitySpec& gravity) : gravity_(gravity) {}
@@ -166,6 +203,13 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.group("body", [&] { body_.state(a); });
+        a.group("top", [&] { top_.state(a); });
+    }
+
 private:
     /// How far something has fallen.
     class Fall
@@ -178,6 +222,13 @@ private:
                 return;
             t_.push_back(t);
             fall_.push_back(depth - *at_start_);
+        }
+        template <class Archive>
+        void state(Archive& a)
+        {
+            a.optional("at_start", "m", at_start_);
+            a.column("t", "s", t_);
+            a.column("fall", "m", fall_);
         }
         /// Means of the first and the last tenth.
         std::optional<std::pair<double, double>> first_and_last() const
@@ -201,17 +252,22 @@ private:
 /// An elastic body that nothing but walls moves. However suddenly they start, a wave carries at most twice their speed: more motion is
 /// stress let go, where the body parted or its points crossed cells. Walls that turn back, or start again, may swing it up: then nothing is
 /// said.
-class ReleaseGuard final : public Guard
+class ReleaseGuard final : public Remembering<ReleaseGuard>
 {
 public:
     void watch(const GuardSample& s, const Solver& solver) override
     {
-        for (const RestraintRecord& r : solver.restraints())
+        const std::vector<RestraintRecord> restraints = solver.restraints();
+        const bool is_new = walls_.empty();
+        walls_.resize(restraints.size());
+        for (std::size_t k = 0; k < restraints.size(); ++k)
         {
+            const RestraintRecord& r = restraints[k];
             if (!r.displacement)
                 continue;
-            const auto [at, is_new] = walls_.try_emplace(r.name, Wall{*r.displacement});
-            Wall& wall = at->second;
+            Wall& wall = walls_[k];
+            if (is_new)
+                wall.displacement = *r.displacement;
             if (is_new || !(s.t > t_))
                 continue;
             const Vec2 v{((*r.displacement)[0] - wall.displacement[0]) / (s.t - t_),
@@ -240,14 +296,30 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("swings", "-", swings_);
+        a.value("t", "s", t_);
+        a.value("speed", "m/s", speed_);
+        a.value("kinetic", "J/m", kinetic_);
+        a.value("mass", "kg/m", mass_);
+        a.column("displacement_x", "m", walls_, [](Wall& w) -> double& { return w.displacement[0]; });
+        a.column("displacement_y", "m", walls_, [](Wall& w) -> double& { return w.displacement[1]; });
+        a.column("way_x", "m/s", walls_, [](Wall& w) -> double& { return w.way[0]; });
+        a.column("way_y", "m/s", walls_, [](Wall& w) -> double& { return w.way[1]; });
+        a.column("fastest", "m/s", walls_, &Wall::fastest);
+        a.column("slowed", "-", walls_, &Wall::slowed);
+    }
+
 private:
     struct Wall
     {
-        Vec2 displacement, way{0, 0};  ///< last velocity that was not zero
+        Vec2 displacement{0, 0}, way{0, 0};  ///< last velocity that was not zero
         double fastest = 0;
         bool slowed = false;  ///< to less than half of that
     };
-    std::map<std::string, Wall> walls_{};
+    std::vector<Wall> walls_{};  ///< and supports, which do not move
     bool swings_ = false;
     double t_ = 0, speed_ = 0, kinetic_ = 0, mass_ = 0;
 };

@@ -106,7 +106,7 @@ bool is_static(const GuardSample& s)
 
 /// Stresses at rest that are noise, from locking, null modes or points that cross, or of too few cells; motion that is nothing but noise.
 /// Motion counts in the frame of supports and walls, without any in that of the centre of mass.
-class NoiseGuard final : public Guard
+class NoiseGuard final : public Remembering<NoiseGuard>
 {
 public:
     explicit NoiseGuard(const Scene& scene) : is_free_(scene.boundaries.empty() && scene.walls.empty()), lattice_(make_lattice(scene.grid))
@@ -149,6 +149,12 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("most", "J/m", most_);
+    }
+
 private:
     double energy(const GuardSample& s) const
     {
@@ -174,7 +180,7 @@ CellKey cell_of(const Lattice& lattice, const Points& q, std::size_t p)
 /// Points that belong to one cell as a whole carry their stress along when they cross a lattice line, and the nodal force jumps. What came
 /// to rest in other cells than it started in is wrong from row to row. LPFDM, which shares the mass of a cell as a whole too, is wrong
 /// before: a cell keeps the mass of its points, and is taken to be partly empty when they are squeezed, overfull when they are stretched.
-class CrossingGuard final : public Guard
+class CrossingGuard final : public Remembering<CrossingGuard>
 {
 public:
     explicit CrossingGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)), shares_cells_(family_of(scene) == Family::lpfdm) {}
@@ -214,6 +220,13 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.column("column", "-", at_start_, &CellKey::first);
+        a.column("line", "-", at_start_, &CellKey::second);
+    }
+
 private:
     template <class F>
     static void for_each_point(const Solver& solver, F&& f)
@@ -245,7 +258,7 @@ private:
 };
 
 /// Cells that hold points of a stiff and of a soft body have one strain for both.
-class MixedCellsGuard final : public Guard
+class MixedCellsGuard final : public Remembering<MixedCellsGuard>
 {
 public:
     explicit MixedCellsGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)) {}
@@ -286,6 +299,11 @@ public:
                                        "times: they have one strain for both",
                                        share_, contrast_)};
         return std::nullopt;
+    }
+
+    template <class Archive>
+    void state(Archive&)
+    {
     }
 
 private:

@@ -16,7 +16,7 @@ bool has_strength(const Scene& scene, const BodySpec& body)
     return scene.material(body.material).has_strength();
 }
 
-class VolumeGuard final : public Guard
+class VolumeGuard final : public Remembering<VolumeGuard>
 {
 public:
     explicit VolumeGuard(bool flows) : flows_(flows) {}
@@ -34,12 +34,19 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("smallest", "-", smallest_);
+        a.value("largest", "-", largest_);
+    }
+
 private:
     bool flows_;
     double smallest_ = 1, largest_ = 1;
 };
 
-class OutsideGuard final : public Guard
+class OutsideGuard final : public Remembering<OutsideGuard>
 {
 public:
     void watch(const GuardSample& s, const Solver&) override { outside_ = std::max(outside_, s.points.outside); }
@@ -50,11 +57,17 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("outside", "-", outside_);
+    }
+
 private:
     double outside_ = 0;
 };
 
-class CourantGuard final : public Guard
+class CourantGuard final : public Remembering<CourantGuard>
 {
 public:
     explicit CourantGuard(double cell_size) : cell_size_(cell_size) {}
@@ -66,12 +79,18 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("largest", "-", largest_);
+    }
+
 private:
     double cell_size_, largest_ = 0;
 };
 
 /// For scenes that are to come to rest: over the last tenth of the run, because an oscillation has no kinetic energy where it turns.
-class RestGuard final : public Guard
+class RestGuard final : public Remembering<RestGuard>
 {
 public:
     explicit RestGuard(double end) : from_(0.9 * end) {}
@@ -89,12 +108,18 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("largest", "-", largest_);
+    }
+
 private:
     double from_, largest_ = 0;
 };
 
 /// An elastic body that is in more parts than at the start was torn by the lattice, not by its law.
-class SeparationGuard final : public Guard
+class SeparationGuard final : public Remembering<SeparationGuard>
 {
 public:
     explicit SeparationGuard(const Scene& scene) : reach_(reach_of(scene))
@@ -131,6 +156,15 @@ public:
         return off ? fmt::format("parts that came off: {}", off) : "";
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("started", "-", started_);
+        a.column("at_start", "-", bodies_, &Parts::at_start);
+        a.column("now", "-", bodies_, &Parts::now);
+        a.column("most", "-", bodies_, &Parts::most);
+    }
+
 private:
     struct Parts
     {
@@ -144,11 +178,13 @@ private:
 };
 
 /// Bodies on one lattice that touch are bonded; elastic ones have no reason to come off each other.
-class ContactGuard final : public Guard
+class ContactGuard final : public Remembering<ContactGuard>
 {
 public:
     explicit ContactGuard(const Scene& scene) : reach_(reach_of(scene))
     {
+        for (const BodySpec& body : scene.bodies)
+            names_.push_back(body.name);
         for (std::size_t a = 0; a < scene.bodies.size(); ++a)
             for (std::size_t b = a + 1; b < scene.bodies.size(); ++b)
                 if (!has_strength(scene, scene.bodies[a]) && !has_strength(scene, scene.bodies[b]))
@@ -164,13 +200,28 @@ public:
             std::erase_if(bonds_, [&](const Bond& bond) { return !touch(bond); });
         started_ = true;
         for (const Bond& bond : bonds_)
-            if (lost_.empty() && !touch(bond))
-                lost_ = fmt::format("bodies '{}' and '{}' were bonded and came off each other", solver.bodies()[bond.a].name,
-                                    solver.bodies()[bond.b].name);
+            if (!lost_ && !touch(bond))
+                lost_ = bond;
     }
     std::optional<Finding> finding(bool) const override
     {
-        return lost_.empty() ? std::nullopt : std::optional(Finding{"contact_lost", lost_});
+        if (lost_)
+            return Finding{"contact_lost",
+                           fmt::format("bodies '{}' and '{}' were bonded and came off each other", names_[lost_->a], names_[lost_->b])};
+        return std::nullopt;
+    }
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("started", "-", started_);
+        a.column("a", "-", bonds_, &Bond::a);
+        a.column("b", "-", bonds_, &Bond::b);
+        std::size_t first = lost_ ? lost_->a : 0, second = lost_ ? lost_->b : 0;  // a body has no bond with itself
+        a.value("lost_a", "-", first);
+        a.value("lost_b", "-", second);
+        if constexpr (Archive::reads)
+            lost_ = first == second ? std::nullopt : std::optional(Bond{first, second});
     }
 
 private:
@@ -181,11 +232,12 @@ private:
     int reach_;
     bool started_ = false;
     std::vector<Bond> bonds_;
-    std::string lost_;
+    std::optional<Bond> lost_;
+    std::vector<std::string> names_;  ///< of the bodies
 };
 
 /// Largest strain component at the points of a method of small strain.
-class StrainGuard final : public Guard
+class StrainGuard final : public Remembering<StrainGuard>
 {
 public:
     void watch(const GuardSample& s, const Solver& solver) override
@@ -217,11 +269,17 @@ public:
         return std::nullopt;
     }
 
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("largest", "-", largest_);
+    }
+
 private:
     double largest_ = 0;
 };
 
-class TimeStepGuard final : public Guard
+class TimeStepGuard final : public Remembering<TimeStepGuard>
 {
 public:
     explicit TimeStepGuard(double critical) : critical_(critical) {}
@@ -231,6 +289,12 @@ public:
         if (dt_ > critical_ * (1 + 1e-9))
             return Finding{"time_step", fmt::format("the time step of {:.4g} s is above the critical one, {:.4g} s", dt_, critical_)};
         return std::nullopt;
+    }
+
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("dt", "s", dt_);
     }
 
 private:

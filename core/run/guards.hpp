@@ -42,6 +42,18 @@ public:
     virtual void at_end(const GuardSample&, const Solver&) {}
     /// What is wrong with the run up to the last sample. @param completed to the end of the scene
     virtual std::optional<Finding> finding(bool completed) const = 0;
+    /// What it remembers from sample to sample, for a restart.
+    virtual void write_state(StateWriter&) = 0;
+    virtual void read_state(StateReader&) = 0;
+};
+
+/// A guard whose template state(archive) lists what it remembers.
+template <class Derived>
+class Remembering : public Guard
+{
+public:
+    void write_state(StateWriter& writer) final { static_cast<Derived*>(this)->state(writer); }
+    void read_state(StateReader& reader) final { static_cast<Derived*>(this)->state(reader); }
 };
 
 /// The limits, each with its reason in docs/methods.md ("Soundness").
@@ -84,6 +96,19 @@ public:
     /// What is worth a word and not wrong: parts that came off where the law may break.
     std::string note() const;
     const std::optional<GuardSample>& last() const { return last_; }
+    template <class Archive>
+    void state(Archive& a)
+    {
+        for (std::size_t k = 0; k < guards_.size(); ++k)
+            a.group("guard/" + std::to_string(k),
+                    [&]
+                    {
+                        if constexpr (Archive::reads)
+                            guards_[k]->read_state(a);
+                        else
+                            guards_[k]->write_state(a);
+                    });
+    }
 
 private:
     std::vector<std::unique_ptr<Guard>> guards_;

@@ -54,6 +54,15 @@ public:
         most_external_ = std::max(most_external_, std::abs(b.external));
         return b;
     }
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("started", "-", started_);
+        a.value("kinetic", "J/m", kinetic_);
+        a.value("elastic", "J/m", elastic_);
+        a.value("volume", "m^2", volume_);
+        a.value("most_external", "J/m", most_external_);
+    }
     /// Energy that the run has had to do with so far: at the start, and brought in [J/m].
     double scale() const { return kinetic_ + elastic_ + most_external_; }
 

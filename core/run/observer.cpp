@@ -62,6 +62,7 @@ Observer::Observer(const Scene& scene, const Solver& solver)
             probe.series.push_back({"exact_stress", "Pa", 6});
         probes_.push_back(std::move(probe));
     }
+    list_columns();
 }
 
 std::vector<Observer::Location> Observer::locations() const
@@ -230,6 +231,71 @@ double Observer::kinetic_ratio(const Solver& solver)
     return strain > 0 ? solver.sums().kinetic_before / strain : std::numeric_limits<double>::infinity();
 }
 
+void Observer::list_columns()
+{
+    const auto points = [this](const Location& at) -> const Points& { return solver_.bodies()[at.body].points; };
+    const auto vector = [](double* row, double x, double y)
+    {
+        row[0] = x;
+        row[1] = y;
+        row[2] = 0;
+    };
+    const auto list = [&](const char* name, const char* unit, std::size_t columns, auto&& fill) {
+        columns_.push_back({name, unit, columns, fill});
+    };
+    list("position", "m", 3, [=](const Location&, const Place& p, double* row) { vector(row, p.x, p.y); });
+    list("initial_position", "m", 3, [=](const Location&, const Place& p, double* row) { vector(row, p.X, p.Y); });
+    list("displacement", "m", 3, [=](const Location&, const Place& p, double* row) { vector(row, p.x - p.X, p.y - p.Y); });
+    list("velocity", "m/s", 3,
+         [=, this](const Location& at, const Place&, double* row)
+         {
+             const Vec2 v = solver_.velocity(at.body, at.point);
+             vector(row, v[0], v[1]);
+         });
+    list("stress", "Pa", 6, [this](const Location& at, const Place&, double* row) { std::ranges::copy(stress(at), row); });
+    list("volume", "m^2", 1, [=](const Location& at, const Place&, double* row) { *row = points(at).current_volume(at.point); });
+    list("initial_volume", "m^2", 1, [=](const Location& at, const Place&, double* row) { *row = points(at).initial_volume; });
+    list("mass", "kg/m", 1, [=](const Location& at, const Place&, double* row) { *row = points(at).mass * points(at).weight_share; });
+    list_fields();
+    if (!exact_.displacement.empty())
+        list("exact_displacement", "m", 3,
+             [this](const Location&, const Place& p, double* row) { std::ranges::copy(exact_displacement(p), row); });
+    if (!exact_.stress.empty())
+        list("exact_stress", "Pa", 6, [this](const Location&, const Place& p, double* row) { std::ranges::copy(exact_stress(p), row); });
+}
+
+void Observer::list_fields()
+{
+    std::map<std::string, std::vector<const Field<double>*>> of_bodies;  // null where a body has no such field
+    std::vector<const Field<double>*> shown;
+    for (std::size_t b = 0; b < solver_.bodies().size(); ++b)
+        solver_.bodies()[b].points.for_each_field(
+            [&](const auto& field)
+            {
+                if constexpr (std::is_same_v<std::remove_cvref_t<decltype(field)>, Field<double>>)
+                    if (field.output().when != Output::When::never)
+                    {
+                        auto [entry, is_new] = of_bodies.try_emplace(std::string(field.name()), solver_.bodies().size(), nullptr);
+                        entry->second[b] = &field;
+                        if (is_new)
+                            shown.push_back(&field);
+                    }
+            });
+    for (const Field<double>* field : shown)
+    {
+        const Output& output = field->output();
+        columns_.push_back(
+            {std::string(output.name.empty() ? field->name() : output.name), std::string(output.unit.empty() ? field->unit() : output.unit),
+             1,
+             [of_body = of_bodies[std::string(field->name())], value = output.value](const Location& at, const Place&, double* row)
+             {
+                 const double held = of_body[at.body] ? (*of_body[at.body])[at.point] : 0.0;
+                 *row = of_body[at.body] && value ? value(held) : held;
+             },
+             output.when == Output::When::at_start});
+    }
+}
+
 void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
 {
     const std::vector<Location> where = locations();
@@ -237,60 +303,15 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     const std::string group = fmt::format("/snapshots/{:04}", snapshot_times_.size());
     file.attribute(group, "time", t);
     file.attribute(group, "step", step);
-    snapshot_fields_.emplace_back();
-    const auto write = [&](const char* name, const char* unit, std::size_t columns, auto&& row_of)
+    for (const Column& column : columns_)
     {
-        std::vector<double> values;
-        values.reserve(where.size() * columns);
+        if (column.at_start_only && !snapshot_times_.empty())
+            continue;
+        std::vector<double> values(where.size() * column.columns);
         for (std::size_t n = 0; n < where.size(); ++n)
-        {
-            const auto row = row_of(where[n], place(where[n], initial[n], t));
-            values.insert(values.end(), row.begin(), row.end());
-        }
-        file.dataset(group + "/" + name, unit, values, columns);
-        snapshot_fields_.back().emplace_back(name, columns);
-    };
-    using Row1 = std::array<double, 1>;
-    using Row3 = std::array<double, 3>;
-    using At = const Location&;
-    using Here = const Place&;
-    const auto points = [&](At at) -> const Points& { return solver_.bodies()[at.body].points; };
-    write("position", "m", 3, [](At, Here p) { return Row3{p.x, p.y, 0}; });
-    write("initial_position", "m", 3, [](At, Here p) { return Row3{p.X, p.Y, 0}; });
-    write("displacement", "m", 3, [](At, Here p) { return Row3{p.x - p.X, p.y - p.Y, 0}; });
-    write("velocity", "m/s", 3,
-          [&](At at, Here)
-          {
-              const Vec2 v = solver_.velocity(at.body, at.point);
-              return Row3{v[0], v[1], 0};
-          });
-    write("stress", "Pa", 6, [&](At at, Here) { return stress(at); });
-    write("volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).current_volume(at.point)}; });
-    write("initial_volume", "m^2", 1, [&](At at, Here) { return Row1{points(at).initial_volume}; });
-    write("mass", "kg/m", 1, [&](At at, Here) { return Row1{points(at).mass * points(at).weight_share}; });
-    const auto any_active = [&](const Field<double> Points::*field)
-    {
-        const auto& bodies = solver_.bodies();
-        return std::any_of(bodies.begin(), bodies.end(), [&](const Body& body) { return (body.points.*field).active(); });
-    };
-    const auto write_field = [&](const char* name, const char* unit, const Field<double> Points::*field, auto&& value_of)
-    {
-        if (any_active(field))
-            write(name, unit, 1,
-                  [&](At at, Here) { return Row1{(points(at).*field).active() ? value_of((points(at).*field)[at.point]) : 0.0}; });
-    };
-    const auto as_it_is = [](double v) { return v; };
-    write_field("plastic_shear_strain", "-", &Points::plastic_shear, as_it_is);
-    write_field("softening_strain", "-", &Points::softening_strain, as_it_is);
-    if (snapshot_times_.empty())  // they do not change
-    {
-        write_field("cohesion", "Pa", &Points::cohesion, as_it_is);
-        write_field("friction_angle", "rad", &Points::sin_friction, [](double sine) { return std::asin(sine); });
+            column.fill(where[n], place(where[n], initial[n], t), &values[n * column.columns]);
+        file.dataset(group + "/" + column.name, column.unit, values, column.columns);
     }
-    if (!exact_.displacement.empty())
-        write("exact_displacement", "m", 3, [&](At, Here p) { return exact_displacement(p); });
-    if (!exact_.stress.empty())
-        write("exact_stress", "Pa", 6, [&](At, Here p) { return exact_stress(p); });
     std::vector<std::uint32_t> id(where.size()), body(where.size());
     for (std::uint32_t n = 0; n < where.size(); ++n)
     {
@@ -336,12 +357,13 @@ std::string Observer::xdmf(const std::string& file_name) const
         text += fmt::format("<Grid Name=\"{:04}\">\n<Time Value=\"{}\"/>\n<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{}\"/>\n"
                             "<Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
                             k, snapshot_times_[k], n, item("position", 3));
-        for (const auto& [field, columns] : snapshot_fields_[k])
-            text += fmt::format("<Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", field,
-                                columns == 6   ? "Tensor6"
-                                : columns == 3 ? "Vector"
-                                               : "Scalar",
-                                item(field, columns));
+        for (const Column& column : columns_)
+            if (!column.at_start_only || k == 0)
+                text += fmt::format("<Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", column.name,
+                                    column.columns == 6   ? "Tensor6"
+                                    : column.columns == 3 ? "Vector"
+                                                          : "Scalar",
+                                    item(column.name, column.columns));
         text += fmt::format("<Attribute Name=\"body\" AttributeType=\"Scalar\" Center=\"Node\">{}</Attribute>\n</Grid>\n",
                             item("body", 1, "UInt"));
     }

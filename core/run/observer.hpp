@@ -7,6 +7,7 @@
 #include "core/run/results.hpp"
 #include "core/run/solver.hpp"
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -28,12 +29,19 @@ public:
     void snapshot(ResultFile& file, double t, std::int64_t step);
     void write_history(ResultFile& file) const;
 
+    /// All that was recorded so far but the snapshots, which are in the result file.
+    template <class Archive>
+    void state(Archive& a);
     double guard_seconds() const { return guard_seconds_; }  ///< spent on what the guards alone need
     std::size_t snapshots() const { return snapshot_times_.size(); }
     /// The file that shows the snapshots in ParaView. @param name of the HDF5 file, without folder
     std::string xdmf(const std::string& name) const;
 
 private:
+    struct Location
+    {
+        std::uint32_t body, point;
+    };
     struct Series
     {
         std::string name, unit;
@@ -51,11 +59,19 @@ private:
     {
         std::vector<Expression> displacement{}, stress{};
     };
-    struct Location
+
+    /// A dataset of a snapshot: a row for each point.
+    struct Column
     {
-        std::uint32_t body, point;
+        std::string name, unit;
+        std::size_t columns;
+        std::function<void(const Location&, const Place&, double*)> fill;
+        bool at_start_only = false;
     };
 
+    void list_columns();
+    /// Columns for those fields of the points that say that they are shown.
+    void list_fields();
     std::vector<Location> locations() const;
     Place place(const Location& at, const Vec2& initial, double t) const;
     std::array<double, 6> stress(const Location& at) const;
@@ -81,7 +97,7 @@ private:
     std::map<std::string, std::vector<Series>> supports_;
     std::vector<Probe> probes_;
     std::vector<double> snapshot_times_;
-    std::vector<std::vector<std::pair<std::string, std::size_t>>> snapshot_fields_;  ///< of each snapshot, with their columns
+    std::vector<Column> columns_;
     Lattice lattice_;
     Ledger ledger_;
     PlasticWork plastic_;
@@ -89,4 +105,44 @@ private:
     double gravity_work_ = 0, gravity_work_error_ = 0, last_time_ = 0, guard_seconds_ = 0;
     Vec2 last_moment_;
 };
+
+template <class Archive>
+void Observer::state(Archive& a)
+{
+    std::size_t samples = 0;
+    const auto list = [&](const std::string& name, std::vector<Series>& series)
+    {
+        a.group(name,
+                [&]
+                {
+                    if constexpr (Archive::reads)
+                        if (series.empty())  // else known from the start: those of a probe
+                            for (const auto& part : a.coming())
+                            {
+                                samples = samples ? samples : part.count;  // the first one has one number for each
+                                series.push_back({part.name, part.unit, part.count / samples});
+                            }
+                    for (Series& s : series)
+                        a.column(s.name, s.unit, s.values);
+                });
+    };
+    list("history", history_);
+    for (const RestraintRecord& r : solver_.restraints())
+        list("support/" + r.name, supports_[r.name]);
+    for (Probe& probe : probes_)
+        list("probe/" + probe.name, probe.series);
+    a.column("snapshot_times", "s", snapshot_times_);
+    a.group("ledger", [&] { ledger_.state(a); });
+    a.group("plastic", [&] { plastic_.state(a); });
+    a.value("gravity_work", "J/m", gravity_work_);
+    a.value("gravity_work_error", "J/m", gravity_work_error_);
+    a.value("last_time", "s", last_time_);
+    a.vector("last_moment", "kg m", last_moment_);
+    a.value("guard_seconds", "s", guard_seconds_);
+    PointMotion& motion = last_.point_motion;
+    a.value("kinetic_energy_points", "J/m", motion.kinetic_energy);
+    a.value("speed", "m/s", motion.speed);
+    a.vector("momentum", "kg/s", motion.momentum);
+    a.value("mass", "kg/m", motion.mass);
+}
 }  // namespace testbed

@@ -1,5 +1,7 @@
 #include "core/run/results.hpp"
 
+#include "core/run/hdf5.hpp"
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -7,31 +9,13 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
-#include <hdf5.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <zlib.h>
 
 namespace testbed
 {
 namespace
 {
-/// The CRC-32 of the first `size` bytes of a file, by its descriptor.
-unsigned long crc_of(int file, std::uint64_t size)
-{
-    unsigned long crc = ::crc32(0, nullptr, 0);
-    std::vector<unsigned char> part(1 << 20);
-    for (std::uint64_t at = 0; at < size;)
-    {
-        const ssize_t n = ::pread(file, part.data(), std::min<std::uint64_t>(part.size(), size - at), static_cast<off_t>(at));
-        if (n <= 0)
-            throw OutputError(fmt::format("the result file cannot be read back: {}", n < 0 ? std::strerror(errno) : "it ends early"));
-        crc = ::crc32(crc, part.data(), static_cast<unsigned>(n));
-        at += static_cast<std::uint64_t>(n);
-    }
-    return crc;
-}
-
 /// Ends a file with its checksum: HDF5 lets bytes follow its own (docs/file_formats.md).
 void append_checksum(int file)
 {
@@ -44,36 +28,6 @@ void append_checksum(int file)
         throw OutputError(fmt::format("writing the result file failed: {}", std::strerror(errno)));
 }
 
-constexpr const char* failed = "writing the result file failed (disk full?); nothing was kept";
-
-/// An HDF5 handle with the function that closes it.
-class Handle
-{
-public:
-    Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close)
-    {
-        if (id < 0)
-            throw OutputError(failed);
-    }
-    ~Handle() { close_(id_); }
-    Handle(const Handle&) = delete;
-    Handle& operator=(const Handle&) = delete;
-    operator hid_t() const { return id_; }
-
-private:
-    hid_t id_;
-    herr_t (*close_)(hid_t);
-};
-
-void check(herr_t status)
-{
-    if (status < 0)
-        throw OutputError(failed);
-}
-}  // namespace
-
-namespace
-{
 bool is_absent_or_file(const std::filesystem::path& path)
 {
     std::error_code ignored;
@@ -215,6 +169,17 @@ void ResultFile::dataset(const std::string& path, const std::string& unit, std::
 void ResultFile::dataset(const std::string& path, const std::string& unit, std::span<const std::uint32_t> values)
 {
     impl_->write_dataset(path, unit, H5T_NATIVE_UINT32, values.data(), values.size(), 1);
+}
+void ResultFile::copy(const ResultFile& from, const std::string& group)
+{
+    if (H5Lexists(from.impl_->file, group.c_str(), H5P_DEFAULT) > 0)
+        check(H5Ocopy(from.impl_->file, group.c_str(), impl_->file, group.c_str(), H5P_DEFAULT, H5P_DEFAULT));
+}
+void ResultFile::copy(const std::filesystem::path& from, const std::string& group)
+{
+    const Handle file(H5Fopen(from.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+    if (H5Lexists(file, group.c_str(), H5P_DEFAULT) > 0)
+        check(H5Ocopy(file, group.c_str(), impl_->file, group.c_str(), H5P_DEFAULT, H5P_DEFAULT));
 }
 void ResultFile::flush()
 {

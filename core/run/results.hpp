@@ -37,6 +37,9 @@ public:
     /// A dataset of rows x columns (columns = 1: one-dimensional). Groups on the way are made.
     void dataset(const std::string& path, const std::string& unit, std::span<const double> values, std::size_t columns = 1);
     void dataset(const std::string& path, const std::string& unit, std::span<const std::uint32_t> values);
+    /// Copies a group with all that it holds, if it is there.
+    void copy(const ResultFile& from, const std::string& group);
+    void copy(const std::filesystem::path& from, const std::string& group);
     void flush();
     /// Closes, syncs to disk and renames to the final name. @throws OutputError, and then nothing is left.
     void commit();

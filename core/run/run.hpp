@@ -25,6 +25,7 @@ enum class ExitCode
 struct RunOptions
 {
     std::string scene, method, output;
+    std::string restart;  ///< file to go on from; the scene is then its own, unless one is named
     std::vector<std::string> overrides;
     int threads = 1;
     bool quiet = false;
@@ -34,6 +35,8 @@ struct RunOptions
 
 using MakeSolver = std::function<std::unique_ptr<Solver>(const Scene&)>;
 
+/// The scene that the options mean. @throws SceneError
+LoadedScene load(const RunOptions& options);
 /// Loads the scene, says its warnings on stderr. @throws SceneError, also for a warning if strict
 Scene load_and_warn(const RunOptions& options);
 

@@ -126,6 +126,8 @@ public:
     }
     /// Work at the nodes up to the time of the last prepare(); none for methods that are no leap-frog on the lattice.
     virtual std::optional<NodalWork> work() const { return std::nullopt; }
+    /// The same up to the last kick, which no step depends on: a restart keeps it. Null without work().
+    virtual NodalWork* work_done() { return nullptr; }
     /// The nodes and their lattice at the last prepare(), for the diagnosis of a run that failed.
     virtual std::pair<const Lattice*, const Nodes*> nodes() const { return {nullptr, nullptr}; }
     virtual std::size_t unknowns() const = 0;  ///< nodal unknowns that carry mass

@@ -17,10 +17,22 @@ StepControl::StepControl(const Scene& scene, Solver& solver)
     dt_ = solver.is_static() ? end_ : scene.time.dt ? *scene.time.dt : cfl_ * critical_;
     if (!(end_ / dt_ < 1e12))
         throw SceneError(fmt::format("{}: time.end = {:.4g} s takes more than 1e12 steps of {:.4g} s", scene.path, end_, dt_));
-    total_ = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(end_ / dt_ * (1 - 1e-12))));
+    total_ = steps_to_end();
     if (!scene.time.dt)
         dt_ = end_ / static_cast<double>(total_);
     shortest_ = longest_ = dt_;
+}
+
+std::int64_t StepControl::steps_to_end() const
+{
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(end_ / dt_ * (1 - 1e-12))));
+}
+
+void StepControl::go_on()
+{
+    total_ = steps_to_end();
+    if (follows_limit_ ? t_ > end_ : taken_ > total_)
+        throw SceneError(fmt::format("time.end = {:.6g} s lies before the time of the restart file, {:.6g} s", end_, t_));
 }
 
 void StepControl::next()

@@ -21,11 +21,26 @@ public:
     const std::optional<double>& sharp() const { return sharp_; }
     bool is_at_end() const { return follows_limit_ ? t_ >= end_ : taken_ >= total_; }
 
+    /// The steps so far and the present length of a step. One of equal steps is kept, and the end comes with the first that reaches it.
+    /// @throws SceneError when reading a state beyond the end
+    template <class Archive>
+    void state(Archive& a)
+    {
+        a.value("taken", "-", taken_);
+        a.value("t", "s", t_);
+        a.value("dt", "s", dt_);
+        a.value("shortest", "s", shortest_);
+        a.value("longest", "s", longest_);
+        if constexpr (Archive::reads)
+            go_on();
+    }
     /// After a step. @throws Diverged when the limit has fallen to a millionth of the first
     void next();
 
 private:
     void follow();
+    void go_on();
+    std::int64_t steps_to_end() const;
 
     Solver& solver_;
     bool follows_limit_;

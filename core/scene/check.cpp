@@ -477,6 +477,8 @@ void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& proble
     check_unique_names(scene.probes, "probe", problems);
     if (scene.output.history < 0)
         problems.add("output.history", "must not be negative");
+    if (!(scene.output.checkpoint >= 0))
+        problems.add("output.checkpoint", "must not be negative");
     if (scene.output.snapshots < 0 || scene.output.snapshots > 9999)
         problems.add("output.snapshots", "between 0 and 9999 is asked");
     if (!(scene.lpfdm.volume_cap == 0 || scene.lpfdm.volume_cap >= 1))

@@ -278,13 +278,15 @@ struct ExactSpec
 
 struct OutputSpec
 {
-    double history = 0;
+    double history = 0, checkpoint = 0;
     int snapshots = 1;
 
     template <class V>
     void describe(V& v)
     {
         v.optional("history", history, "s", "interval of the history; 0 makes 200 samples, and every step is the finest");
+        v.optional("checkpoint", checkpoint, "s",
+                   "wall clock time between restart files, of which the last replaces the one before; 0: only when a run is stopped");
         v.optional("snapshots", snapshots, "-", "equally spaced in time, the last at the end; one more is written at the start");
     }
 };

@@ -10,12 +10,13 @@ from testbed_reports.draw.drawing import FigureError
 from testbed_reports.draw.figures import draw
 from testbed_reports.draw.maps import INCLUSION, _stripe
 from testbed_reports.draw.style import Style
+from testbed_reports.read.results import ResultError
 
 WALL = '[[wall]]\nname = "cap"\nmin = [-1.0, 2.0]\nmax = [3.0, 2.5]\n'
 X, H = lattice(1.0, 2.0, 0.1), 0.1
 TIME = np.linspace(0.0, 4.0, 41)
 BASE = {"X": X, "h": H, "time": TIME, "snapshots": 2, "scene_extra": WALL,
-        "fields": {"plastic_shear_strain": X[:, 0] / 10, "body": (X[:, 1] > 1.5).astype(float),
+        "fields": {"plastic_shear_strain": X[:, 0] / 10, "softening_strain": X[:, 1], "body": (X[:, 1] > 1.5).astype(float),
                    "friction_angle": np.full(len(X), np.pi / 6)},
         "supports": {"cap": {"displacement": vectors(y=-0.05 * TIME), "reaction": vectors(y=-TIME)},
                      "base": {"reaction": vectors(y=3.0 * TIME)}}, "reference": {"height": 2.0, "width": 1.5}}
@@ -53,6 +54,14 @@ def test_a_field_without_an_exact_solution_has_no_error_panels(study):
     assert soil.get_clim()[0] == 0.0 and soil.get_cmap().name == "viridis"
     assert tuple(grey.get_facecolor()[0][:3]) == to_rgb(INCLUSION) and len(grey.get_paths()) == (X[:, 1] > 1.5).sum()
     assert drawing.figure.axes[-1].get_ylabel() == r"Plastic shear strain $\gamma^\mathrm{p}$"
+
+
+def test_any_field_of_one_number_is_drawn_by_its_name(study):
+    drawing = drawn(study, kind="field", component="softening_strain", inclusions=False)
+    assert numbers(cells(panels(drawing)[0])[1]) == pytest.approx(X[:, 1])
+    assert drawing.figure.axes[-1].get_ylabel().startswith("Softening strain")
+    with pytest.raises(ResultError, match="lacks the field softning_strain; it has .*softening_strain"):
+        drawn(study, kind="field", component="softning_strain")
 
 
 def test_inclusions_may_be_coloured_too(study):

@@ -7,7 +7,7 @@ from . import norms
 # Fields with components: name -> (what an axis is called, symbol, unit)
 FIELDS = {"stress": ("Stress", r"\sigma", "Pa"), "displacement": ("Displacement", "u", "m"),
           "velocity": ("Velocity", "v", "m/s"), "position": ("Position", "x", "m"), "reaction": ("Reaction", "R", "N/m")}
-# Fields of one number per point
+# Fields of one number per point that have a symbol; others that a snapshot holds go by their name
 SCALARS = {"plastic_shear_strain": ("Plastic shear strain", r"\gamma^\mathrm{p}", ""), "cohesion": ("Cohesion", "c", "Pa"),
            "friction_angle": ("Friction angle", r"\varphi", "rad")}
 
@@ -21,13 +21,12 @@ def split(component):
     name, _, part = component.rpartition("_")
     if name in FIELDS and part in (TENSOR if name == "stress" else VECTOR):
         return name, part
-    raise ResultError(f"unknown component '{component}' (such as stress_yy, mean_stress, displacement_y, velocity, "
-                      f"{', '.join(SCALARS)})")
+    return component, ""
 
 
 def pick(values, name, part):
     """(N,) from a field (N,), (N, 3) or (N, 6)."""
-    if name in SCALARS:
+    if name not in FIELDS:
         return values
     if name == "stress":
         if part == "mean":
@@ -37,12 +36,14 @@ def pick(values, name, part):
 
 
 def default_unit(name):
-    return (FIELDS | SCALARS)[name][2]
+    return (FIELDS | SCALARS).get(name, ("", "", ""))[2]
 
 
 def symbol(component):
     """What an axis is called: words and the symbol."""
     name, part = split(component)
+    if name not in FIELDS | SCALARS:
+        return name.replace("_", " ").capitalize()
     words, letter, _ = (FIELDS | SCALARS)[name]
     if part == "mean":
         return r"Mean stress $\sigma_\mathrm{m}$"
@@ -56,8 +57,12 @@ def of_snapshot(snapshot, component, exact=False):
     name, part = split(component)
     field = f"exact_{name}" if exact else name
     if field not in snapshot:
-        raise ResultError(f"{snapshot.result.path.parent.name}: snapshot {snapshot.name} lacks the field {field}")
-    return np.asarray(pick(snapshot[field], name, part))
+        raise ResultError(f"{snapshot.result.path.parent.name}: snapshot {snapshot.name} lacks the field {field}; it has "
+                          f"{', '.join(sorted(snapshot.fields))}, and components such as stress_yy, mean_stress, displacement_y")
+    values = np.asarray(pick(snapshot[field], name, part))
+    if values.ndim > 1:
+        raise ResultError(f"{field} has several components")
+    return values
 
 
 def has_exact(snapshot, component):
