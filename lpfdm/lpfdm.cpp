@@ -85,11 +85,13 @@ public:
                        node_ops_.note_hourglass((1 - 2 * hourglass_rate() * step.kick()) * power);  // half of the decay is then done
                    });
         internal_ = force_norm(nodes_);
+        if (body_force_)
+            timer_("forcing", [&] { body_force_->evaluate(bodies_, t); });
         timer_("node operations (11)(15)",
                [&]
                {
                    if (body_force_)
-                       node_ops_.apply_load(nodes_, [&] { add_body_force(t); });
+                       node_ops_.apply_load(nodes_, [&] { add_body_force(); });
                    if (tractions_)
                        node_ops_.apply_load(nodes_, [&] { tractions_->apply(grid_.lattice, bodies_, nodes_, t); });
                    if (weight_)
@@ -418,9 +420,9 @@ private:
         }
     }
 
-    void add_body_force(double t)
+    void add_body_force()
     {
-        body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather, t,
+        body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
                                              [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
         for (const auto n : nodes_.active())
             for (int k = 0; k < 4; ++k)

@@ -84,11 +84,13 @@ public:
                    });
         fold_forces();
         internal_ = force_norm(nodes_);
+        if (body_force_)
+            timer_("forcing", [&] { body_force_->evaluate(bodies_, t); });
         timer_("node operations",
                [&]
                {
                    if (body_force_)
-                       node_ops_.apply_load(nodes_, [&] { add_body_force(t); });
+                       node_ops_.apply_load(nodes_, [&] { add_body_force(); });
                    if (tractions_)
                        node_ops_.apply_load(nodes_,
                                             [&]
@@ -342,9 +344,9 @@ private:
         nodes_.vx[i] *= inverse;
         nodes_.vy[i] *= inverse;
     }
-    void add_body_force(double t)
+    void add_body_force()
     {
-        body_force_->template apply<Shape>(lattice_, bodies_, gather_, t,
+        body_force_->template apply<Shape>(lattice_, bodies_, gather_,
                                            [&](std::size_t n, const std::array<double, 2>& f)
                                            {
                                                nodes_.fx[n] += f[0];

@@ -27,6 +27,13 @@ public:
             }
         phases_.emplace_back(phase, seconds);
     }
+    double seconds(std::string_view phase) const
+    {
+        for (const auto& [name, total] : phases_)
+            if (name == phase)
+                return total;
+        return 0;
+    }
     const std::vector<std::pair<const char*, double>>& phases() const { return phases_; }
 
 private:

@@ -3,6 +3,7 @@
 
 #include "core/bodies/support.hpp"
 #include "core/lattice/gather.hpp"
+#include "core/scene/formula.hpp"
 
 namespace testbed
 {
@@ -11,36 +12,47 @@ class BodyForce
 public:
     BodyForce(const BodyForceSpec& spec, const Constants& constants) : acceleration_(spec.acceleration, constants) {}
 
-    /// Adds the force of all bodies: sink(entity, {F_x, F_y}) for each active cell or node of `gather`.
-    template <class Support, class Sink>
-    void apply(const Lattice& lattice, const std::vector<Body>& bodies, const Gather& gather, double t, Sink&& sink)
+    /// Evaluates the expression at the points: the forcing of a manufactured solution is no part of a method. @throws ExpressionError
+    void evaluate(const std::vector<Body>& bodies, double t)
     {
-        partial_.resize(gather.blocks() * 2);
-        std::size_t first_bin = 0;
+        std::size_t points = 0;
+        for (const Body& body : bodies)
+            points += body.points.count;
+        bx_.resize(points + pack_size);
+        by_.resize(points + pack_size);
+        std::size_t first = 0;
         for (const Body& body : bodies)
         {
             const Points& q = body.points;
-            bx_.activate(q.count);
-            by_.activate(q.count);
-            for (std::size_t p = 0; p < q.count; ++p)
-            {
-                const Vec2 b = acceleration_({q.X[p], q.Y[p], q.x[p], q.y[p], t});
-                bx_[p] = q.mass * q.weight_share * b[0];
-                by_[p] = q.mass * q.weight_share * b[1];
-            }
+            const std::array<double*, 2> results{&bx_[first], &by_[first]};
+            acceleration_.evaluate({q.X.data(), q.Y.data(), q.x.data(), q.y.data(), t}, q.count, results);
+            first += q.count;
+        }
+    }
+
+    /// Adds the force of all bodies: sink(entity, {F_x, F_y}) for each active cell or node of `gather`.
+    template <class Support, class Sink>
+    void apply(const Lattice& lattice, const std::vector<Body>& bodies, const Gather& gather, Sink&& sink)
+    {
+        partial_.resize(gather.blocks() * 2);
+        std::size_t first_bin = 0, first = 0;
+        for (const Body& body : bodies)
+        {
+            const Pack weight(body.points.mass * body.points.weight_share);
             spread<Support, 2>(lattice, body, first_bin, partial_,
                                [&](std::size_t p, const auto& lanes) {
-                                   return std::array<Pack, 2>{lanes.load(&bx_[p]), lanes.load(&by_[p])};
+                                   return std::array<Pack, 2>{weight * lanes.load(&bx_[first + p]), weight * lanes.load(&by_[first + p])};
                                });
             first_bin += body.bins.list().size();
+            first += body.points.count;
         }
         gather.sum<2>(partial_, sink);
     }
-    std::size_t bytes() const { return bx_.bytes() + by_.bytes() + partial_.capacity() * sizeof(double); }
+    std::size_t bytes() const { return (bx_.capacity() + by_.capacity() + partial_.capacity()) * sizeof(double); }
 
 private:
-    VectorExpression acceleration_;
-    Field<double> bx_{"body_force_x", "N/m"}, by_{"body_force_y", "N/m"};
+    Formula acceleration_;
+    std::vector<double> bx_, by_;  ///< by point, body after body [m/s^2]
     std::vector<double> partial_;
 };
 }  // namespace testbed

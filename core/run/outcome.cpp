@@ -128,6 +128,7 @@ void write_performance(ResultFile& file, Solver& solver, const StepControl& cloc
     const double particle_steps = static_cast<double>(points) * static_cast<double>(out.steps);
     file.attribute(group, "setup_s", setup_seconds);
     file.attribute(group, "solve_s", out.solve_seconds);
+    file.attribute(group, "forcing_s", out.forcing_seconds);
     file.attribute(group, "output_s", out.output_seconds);
     file.attribute(group, "guards_s", out.guard_seconds + observer.guard_seconds());
     file.attribute(group, "steps", out.steps);

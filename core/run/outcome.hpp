@@ -13,7 +13,7 @@ struct Outcome
     std::string status = "completed", reason;
     ExitCode code = ExitCode::completed;
     std::int64_t steps = 0;
-    double solve_seconds = 0, output_seconds = 0, guard_seconds = 0;
+    double solve_seconds = 0, forcing_seconds = 0, output_seconds = 0, guard_seconds = 0;
     std::vector<Finding> findings;
     std::string note;
     Diagnosis diagnosis;

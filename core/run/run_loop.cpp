@@ -92,12 +92,26 @@ void RunLoop::state(Archive& a)
     a.value("next_sample", "s", next_sample_);
     a.value("next_snapshot", "s", next_snapshot_);
     a.value("looked_at", "-", looked_at_);
-    double solved = solve_seconds_before_ + watch_.seconds() - output_seconds_;
+    double solved = solve_seconds(), forced = forcing_seconds();
     a.value("solve_seconds", "s", solved);
+    a.value("forcing_seconds", "s", forced);
     a.value("output_seconds", "s", out_.output_seconds);
     a.value("guard_seconds", "s", out_.guard_seconds);
     if constexpr (Archive::reads)
+    {
         solve_seconds_before_ = solved;
+        forcing_seconds_before_ = forced;
+    }
+}
+
+double RunLoop::forcing_seconds() const
+{
+    return forcing_seconds_before_ + solver_.timer().seconds("forcing");
+}
+
+double RunLoop::solve_seconds() const
+{
+    return solve_seconds_before_ + watch_.seconds() - output_seconds_ - solver_.timer().seconds("forcing");
 }
 
 void RunLoop::restore(const State& from)
@@ -224,7 +238,8 @@ Outcome RunLoop::run()
         stop("diverged", ExitCode::diverged, fmt::format("{} (t = {:.6g} s, step {})", e.what(), clock_.t(), out_.steps));
         observer_.snapshot(file_, clock_.t(), out_.steps);
     }
-    out_.solve_seconds = solve_seconds_before_ + watch_.seconds() - output_seconds_;
+    out_.solve_seconds = solve_seconds();
+    out_.forcing_seconds = forcing_seconds();
     if (out_.status != "diverged")
     {
         const Stopwatch looking;

@@ -28,6 +28,9 @@ private:
 
     template <class Archive>
     void state(Archive& a);
+    /// Of the method: without output, and without the forcing of a manufactured solution.
+    double solve_seconds() const;
+    double forcing_seconds() const;
     void write_checkpoint();
     /// The state before the step, if it is time for it. @param stops whether the run ends here before its time
     void checkpoint_if_due(bool stops, bool ends);
@@ -49,8 +52,8 @@ private:
     Stopwatch watch_;
     double history_interval_, snapshot_interval_;
     double next_sample_ = 0, next_snapshot_ = 0, next_checkpoint_;
-    double solve_seconds_before_ = 0;  ///< of the run that this one continues
-    double output_seconds_ = 0;        ///< of this one
-    std::int64_t looked_at_ = 0;       ///< step in which the points were looked at last
+    double solve_seconds_before_ = 0, forcing_seconds_before_ = 0;  ///< of the run that this one continues
+    double output_seconds_ = 0;                                     ///< of this one
+    std::int64_t looked_at_ = 0;                                    ///< step in which the points were looked at last
 };
 }  // namespace testbed
