@@ -272,16 +272,13 @@ private:
 };
 
 /// Strain and rotation (5e), (5f), stress, volume, and position by eq. (6), for the points of one body; and, while they are at hand, the
-/// sums of its bins (`sums`, from the body's first on) for the next step. Returns whether a point left its bin: its sums are then no longer
-/// right.
+/// sums of its bins (`sums`, from the body's first on) for the next step. Marks bins that a point left: their sums are then not right.
 template <class Support, class Law>
-bool move_points(const LpfdmGrid& grid, const MidSteps& mid_steps, Body& body, const Law& law, const StrainIncrement& increment, double dt,
+void move_points(const LpfdmGrid& grid, const MidSteps& mid_steps, Body& body, const Law& law, const StrainIncrement& increment, double dt,
                  double* sums)
 {
     Points& q = body.points;
-    Bins& sorted = body.bins;
-    const auto& bins = sorted.list();
-    std::atomic<bool> moved{false};
+    const auto& bins = body.bins.list();
     parallel_for(bins.size(),
                  [&](std::size_t b) TESTBED_FLATTEN
                  {
@@ -298,11 +295,7 @@ bool move_points(const LpfdmGrid& grid, const MidSteps& mid_steps, Body& body, c
                                        lanes.store(&q.y[p], y);
                                    });
                      if (sum_bin<Support, CellSums<Support>>(grid.lattice, body, bins[b], sums + b * CellSums<Support>::numbers))
-                     {
-                         sorted.mark(b);
-                         moved.store(true, std::memory_order_relaxed);
-                     }
+                         body.bins.mark(b);
                  });
-    return moved;
 }
 }  // namespace testbed

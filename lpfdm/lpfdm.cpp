@@ -1,9 +1,6 @@
 #include "lpfdm/lpfdm.hpp"
 
-#include "core/bodies/density_scaling.hpp"
-#include "core/bodies/nonlocal.hpp"
-#include "core/loads/body_force.hpp"
-#include "core/loads/tractions.hpp"
+#include "core/run/particle_solver.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
 #include "lpfdm/time_step.hpp"
@@ -15,67 +12,54 @@ namespace testbed
 namespace
 {
 template <class Support>
-class Lpfdm final : public Solver
+class Lpfdm final : public ParticleSolver<Support>
 {
 public:
     explicit Lpfdm(const Scene& scene)
-        : grid_(without_numbers(make_lattice(scene.grid))),
-          bodies_(
-              make_bodies(scene, make_lattice(scene.grid), {.box = Support::has_box, .initial_position = scene.body_force.has_value()})),
-          node_ops_(scene, make_lattice(scene.grid)),
+        : Base(scene, {.box = Support::has_box}),
+          grid_(without_numbers(make_lattice(scene.grid))),
           mass_before_(grid_.lattice.nodes(), 0),
           options_(scene.lpfdm),
           increment_{scene.lpfdm.convection == LpfdmSpec::Convection::two_sided ? 0.5 : 0.0}
     {
         if (options_.convection == LpfdmSpec::Convection::two_sided)
+        {
             faces_.emplace(grid_.lattice.nodes());
-        if (scene.body_force)
-            body_force_.emplace(*scene.body_force, scene.expression_constants());
-        if (!scene.tractions.empty())
-            tractions_.emplace(scene);
-        if (has_nonlocal_softening(scene))
-            nonlocal_.emplace(scene, grid_.lattice.cell_size);
-        if (scene.time.density_scaling)
-            node_ops_.weigh_with(weight_.emplace().nodes);
-        if (scene.damping)
-            damping_ = scene.damping->local;
-        for (const Body& body : bodies_)
-            wave_speed_ =
-                std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
-        if (faces_)
-            faces_->full_mass = lightest_full_node();
-        if (options_.volume_cap > 0)
-            for (Body& body : bodies_)
-                body.counted_volume = options_.volume_cap * body.points.initial_volume;
+            faces_->full_mass = cloud_.least_node_mass(grid_.lattice.cell_size);
+        }
+        for (Body& body : bodies_)
+        {
+            const Points& q = body.points;
+            wave_speed_ = std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * q.initial_volume / q.mass));
+            if (options_.volume_cap > 0)
+                body.counted_volume = options_.volume_cap * q.initial_volume;
+        }
         rebuild();
         set_initial_velocity(scene);
     }
 
     void do_prepare(const Step& step) override
     {
-        const double t = step.t, dt = step.dt;
-        node_ops_.begin_step(t, dt);
-        timer_("bins",
-               [&]
-               {
-                   if (moved_)
-                       rebuild();
-               });
-        if (nonlocal_)
+        node_ops_.begin_step(step.t, step.dt);
+        bool others = false;  // cells and nodes in use
+        if (cloud_.has_moved())
+            timer_("bins", [&] { others = rebuild(); });
+        if (cloud_.nonlocal)
             timer_("nonlocal strain",
-                   [&] {
-                       nonlocal_->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
-                                                          [&](int i, int j) { return grid_.lattice.cell(i, j); });
+                   [&]
+                   {
+                       cloud_.nonlocal->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
+                                                                [&](int i, int j) { return grid_.lattice.cell(i, j); });
                    });
         timer_("cell averages (7)(8)", [&] { cell_averages(grid_, sums_.all()); });
         timer_("nodal forces (9)(10)", [&] { nodal_forces(grid_); });
         timer_("convection (13)",
                [&]
                {
-                   extend_to_frontier();
+                   extend_to_frontier(step, others);
                    convect_velocity(step.last_dt);
                    keep_mass();
-                   node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
+                   restrain();
                });
         if (options_.hourglass > 0)
             timer_("hourglass",
@@ -84,21 +68,7 @@ public:
                        const double power = resist_hourglass(grid_, hourglass_rate(), hourglass_x_, hourglass_y_);
                        node_ops_.note_hourglass((1 - 2 * hourglass_rate() * step.kick()) * power);  // half of the decay is then done
                    });
-        internal_ = force_norm(nodes_);
-        if (body_force_)
-            timer_("forcing", [&] { body_force_->evaluate(bodies_, t); });
-        timer_("node operations (11)(15)",
-               [&]
-               {
-                   if (body_force_)
-                       node_ops_.apply_load(nodes_, [&] { add_body_force(); });
-                   if (tractions_)
-                       node_ops_.apply_load(nodes_, [&] { tractions_->apply(grid_.lattice, bodies_, nodes_, t); });
-                   if (weight_)
-                       find_weight();
-                   node_ops_.apply_forces(grid_.lattice, nodes_, t);
-               });
-        lag_ = 0.5 * step.last_dt;
+        this->apply_loads("node operations (11)(15)", grid_.lattice, nodes_, step.t);
     }
 
     void do_advance(const Step& step) override
@@ -108,19 +78,18 @@ public:
                [&]
                {
                    node_ops_.kick(nodes_, step.kick());
-                   node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
+                   restrain();
                });
         if (faces_)
             timer_("convection (13)",
                    [&]
                    {
                        cell_gradients(grid_, dt);
-                       if (!started_)
+                       if (step.is_first())
                            faces_->find(grid_);
                        convect(grid_, *faces_, dt, 0.5, nullptr);
-                       node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
+                       restrain();
                    });
-        started_ = true;
         timer_("cell strain (5)",
                [&]
                {
@@ -129,32 +98,18 @@ public:
                    if constexpr (Support::has_box)
                        mid_steps_.find(grid_, increment_.theta, dt);
                });
-        timer_("points (6), material",
-               [&]
-               {
-                   std::size_t first_bin = 0;
-                   for (Body& body : bodies_)
-                   {
-                       moved_ |=
-                           std::visit([&](const auto& law)
-                                      { return move_points<Support>(grid_, mid_steps_, body, law, increment_, dt, sums_.of(first_bin)); },
-                                      body.material);
-                       first_bin += body.bins.list().size();
-                   }
-               });
+        timer_("points (6), material", [&] { move_all_points(dt); });
         node_ops_.end_step(dt);
     }
 
-    MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, lag_, internal_); }
+    MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, this->lag(), internal_); }
 
     PointMotion point_motion() const override
     {
         return point_motion_of(bodies_, [&](std::size_t body, std::size_t p) { return Lpfdm::velocity(body, p); });
     }
-    std::optional<NodalWork> work() const override { return node_ops_.work(nodes_, lag_); }
-    NodalWork* work_done() override { return &node_ops_.work_done(); }
+    std::optional<NodalWork> work() const override { return node_ops_.work(nodes_, this->lag()); }
     std::pair<const Lattice*, const Nodes*> nodes() const override { return {&grid_.lattice, &nodes_}; }
-    const std::vector<Body>& bodies() const override { return bodies_; }
 
     /// Bilinear, as eq. (6) moves the point.
     Vec2 velocity(std::size_t body, std::size_t p) const override
@@ -183,17 +138,13 @@ public:
     std::size_t active_cells() const override { return grid_.gather.active().size(); }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + grid_.bytes() + mass_before_.capacity() * sizeof(double) + sums_.bytes() +
-               (workspace_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity()) * sizeof(double) +
-               cell_force_.capacity() * sizeof(Vec2) + (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) +
-               (faces_ ? faces_->bytes() : 0) + mid_steps_.bytes() + (weight_ ? weight_->bytes() : 0) +
-               cell_weight_.capacity() * sizeof(double);
+        const std::size_t numbers = mass_before_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity() + cell_weight_.capacity() +
+                                    2 * cell_force_.capacity();
+        return this->bytes_of_points_and_loads() + grid_.bytes() + sums_.bytes() + mid_steps_.bytes() + (faces_ ? faces_->bytes() : 0) +
+               numbers * sizeof(double);
     }
     void write_state(StateWriter& writer) override { state(writer); }
     void read_state(StateReader& reader) override { state(reader); }
-    const PhaseTimer& timer() const override { return timer_; }
-    std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
-    const char* kinematics() const override { return "hypoelastic"; }
     std::vector<StepLimit> step_limits() override { return lpfdm_step_limits(grid_, bodies_, hourglass_rate(), damping_); }
     std::optional<double> sharp_step_limit() override
     {
@@ -203,25 +154,16 @@ public:
     }
 
 private:
-    static constexpr int S = Support::S;
-
-    /// Mass of a node among four full cells of the lightest body [kg/m].
-    double lightest_full_node() const
-    {
-        double density = std::numeric_limits<double>::infinity();
-        for (const Body& body : bodies_)
-            density = std::min(density, body.points.mass / body.points.initial_volume);
-        return density * grid_.lattice.cell_size * grid_.lattice.cell_size;
-    }
+    using Base = ParticleSolver<Support>;
+    using Base::bodies_, Base::body_force_, Base::cloud_, Base::damping_, Base::internal_, Base::node_ops_, Base::S, Base::timer_,
+        Base::weight_;
 
     template <class Archive>
     void state(Archive& a)
     {
-        for (Body& body : bodies_)
-            body.state(a);
+        cloud_.state(a);
         node_ops_.state(a);
-        a.value("started", "-", started_);
-        a.value("last_dt", "s", last_dt_);
+        a.value("last_dt", "s", this->last_dt_);
         Lattice lattice = grid_.lattice;
         lattice.state(a);
         if constexpr (Archive::reads)
@@ -249,53 +191,51 @@ private:
         std::fill(mass_before_.begin(), mass_before_.end(), 0.0);
         std::fill(hourglass_x_.begin(), hourglass_x_.end(), 0.0);
         std::fill(hourglass_y_.begin(), hourglass_y_.end(), 0.0);
-        std::vector<const Bins*> bins;
-        moved_ = false;
-        for (const Body& body : bodies_)
-        {
-            bins.push_back(&body.bins);
-            moved_ |= body.bins.has_marks();
-        }
-        grid_.rebuild<S>(bins);
+        grid_.rebuild<S>(cloud_.bins());
         left_.clear();
-        was_rebuilt_ = true;
         gradients_over_ = 0;
         sums_.update(grid_.lattice, bodies_);
     }
 
-    /// Points changed their cells: sorts them and finds the cells and nodes in use.
-    void rebuild()
+    /// Points changed their cells: sorts them and finds the cells and nodes in use. Returns whether these are others.
+    bool rebuild()
     {
-        std::vector<const Bins*> bins;
-        bool other_bins = false;
+        if (!cloud_.sort())
+        {
+            sums_.update_changed(grid_.lattice, bodies_);
+            return false;
+        }
+        const std::vector<const Bins*> bins = cloud_.bins();
+        if (const Lattice lattice = with_numbers_for<S>(grid_.lattice, bins); lattice.numbered != grid_.lattice.numbered)
+            renumber(lattice);
+        if (options_.hourglass > 0)
+            for (const auto c : grid_.gather.active())  // the nodes around a cell that goes out of use may stay
+                hourglass_x_[c] = hourglass_y_[c] = 0;
+        left_ = grid_.rebuild<S>(bins);
+        sums_.update(grid_.lattice, bodies_);
+        return true;
+    }
+
+    void restrain() { node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy); }
+
+    void move_all_points(double dt)
+    {
+        std::size_t first_bin = 0;
         for (Body& body : bodies_)
         {
-            other_bins |= body.bins.template rebuild<Support>(body.points, workspace_);
-            bins.push_back(&body.bins);
+            std::visit([&](const auto& law) { move_points<Support>(grid_, mid_steps_, body, law, increment_, dt, sums_.of(first_bin)); },
+                       body.material);
+            first_bin += body.bins.list().size();
         }
-        if (other_bins)
-        {
-            if (const Lattice lattice = with_numbers_for<S>(grid_.lattice, bins); lattice.numbered != grid_.lattice.numbered)
-                renumber(lattice);
-            if (options_.hourglass > 0)
-                for (const auto c : grid_.gather.active())  // the nodes around a cell that goes out of use may stay
-                    hourglass_x_[c] = hourglass_y_[c] = 0;
-            left_ = grid_.rebuild<S>(bins);
-            was_rebuilt_ = true;
-            sums_.update(grid_.lattice, bodies_);
-        }
-        else
-            sums_.update_changed(grid_.lattice, bodies_);
-        moved_ = false;
     }
 
     double hourglass_rate() const { return options_.hourglass * wave_speed_ / grid_.lattice.cell_size; }
 
-    /// The masses of the nodes that have weight: a quarter of those of the cells around them.
-    void find_weight()
+    /// A quarter of those of the cells around them.
+    void find_weight() override
     {
         weight_->nodes.assign(nodes_.mass.size(), 0.0);
-        weight_->collect<4>(bodies_, grid_.gather, sums_.all(), S * S, [&](std::size_t c, double mass) { cell_weight_[c] = mass; });
+        weight_->template collect<4>(bodies_, grid_.gather, sums_.all(), S * S, [&](std::size_t c, double mass) { cell_weight_[c] = mass; });
         for (const auto c : grid_.gather.active())
             for (int k = 0; k < 4; ++k)
                 weight_->nodes[grid_.corner(grid_.first_node(c), k)] += 0.25 * cell_weight_[c];
@@ -313,8 +253,8 @@ private:
             cell_force_.assign(to.cells(), {0, 0});
         if (weight_)
             cell_weight_.assign(to.cells(), 0.0);
-        if (nonlocal_)
-            nonlocal_->resize(to.cell_stride(), to.cells());
+        if (cloud_.nonlocal)
+            cloud_.nonlocal->resize(to.cell_stride(), to.cells());
         if (options_.hourglass > 0)
         {
             hourglass_x_.assign(to.cells(), 0.0);
@@ -324,17 +264,18 @@ private:
 
     /// Nodes that material reaches for the first time take the mass-weighted mean velocity of their neighbours that were
     /// active before (or start from zero, as printed); nodes that it left are cleared.
-    void extend_to_frontier()
+    void extend_to_frontier(const Step& step, bool others)
     {
-        if (!std::exchange(was_rebuilt_, false) && (S == 1 || !frontier_moved()))  // with S = 1 a cell in use has mass
+        if (!others && (S == 1 || !frontier_moved()))  // with S = 1 a cell in use has mass
             return;
         gradients_over_ = 0;
         std::vector<std::pair<std::uint32_t, Vec2>> reached;
         for (const auto n : nodes_.active())
             if (nodes_.mass[n] > 0 && !mass_before_[n])
-                reached.emplace_back(n, started_ && options_.frontier != LpfdmSpec::Frontier::literal ? mean_of_neighbours(n) : Vec2{0, 0});
+                reached.emplace_back(n, !step.is_first() && options_.frontier != LpfdmSpec::Frontier::literal ? mean_of_neighbours(n)
+                                                                                                              : Vec2{0, 0});
         for (const auto& [n, v] : reached)
-            if (started_)
+            if (!step.is_first())
             {
                 nodes_.vx[n] = v[0];
                 nodes_.vy[n] = v[1];
@@ -402,10 +343,10 @@ private:
         return mass > 0 ? Vec2{momentum[0] / mass, momentum[1] / mass} : Vec2{0, 0};
     }
 
-    /// Eq. (13).
+    /// Eq. (13), for the step that led here; there is none at the start.
     void convect_velocity(double dt)
     {
-        if (options_.convection == LpfdmSpec::Convection::none || !started_)
+        if (options_.convection == LpfdmSpec::Convection::none || dt == 0)
             return;
         if (gradients_over_ != dt)
             cell_gradients(grid_, dt);
@@ -420,7 +361,7 @@ private:
         }
     }
 
-    void add_body_force()
+    void add_body_force() override
     {
         body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
                                              [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
@@ -468,27 +409,18 @@ private:
 
     LpfdmGrid grid_;
     Nodes& nodes_ = grid_.nodes;
-    std::vector<Body> bodies_;
-    NodeOps node_ops_;
     std::vector<double> mass_before_;  ///< of nodes, in the step before [kg/m]
     std::vector<std::uint32_t> left_;  ///< nodes that went out of use
     LpfdmSpec options_;
     StrainIncrement increment_;
     MidSteps mid_steps_;                             ///< empty for points without a box
     LpfdmSums<Support> sums_;                        ///< up to date from the end of a step on, but for bins that points left
-    std::vector<double> workspace_;                  ///< the way of a field to its new order
     std::vector<double> hourglass_x_, hourglass_y_;  ///< empty unless the scene has them
     std::vector<Vec2> cell_force_;                   ///< so, too
+    std::vector<double> cell_weight_;                ///< so, too
     std::optional<FreeFaces> faces_;                 ///< so, too
-    std::optional<BodyForce> body_force_;
-    std::optional<Tractions> tractions_;
-    std::optional<NonlocalStrain> nonlocal_;
-    std::optional<NodalWeight> weight_;
-    std::vector<double> cell_weight_;  ///< empty without density scaling
-    PhaseTimer timer_;
-    double damping_ = 0, wave_speed_ = 0, internal_ = 0, lag_ = 0;
+    double wave_speed_ = 0;
     double gradients_over_ = 0;  ///< the step over which the cells hold the gradients of the present velocity; 0: none
-    bool moved_ = false, was_rebuilt_ = true, started_ = false;
 };
 }  // namespace
 

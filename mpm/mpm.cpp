@@ -1,10 +1,7 @@
 #include "mpm/mpm.hpp"
 
-#include "core/bodies/density_scaling.hpp"
-#include "core/bodies/nonlocal.hpp"
 #include "core/lattice/gather.hpp"
-#include "core/loads/body_force.hpp"
-#include "core/loads/tractions.hpp"
+#include "core/run/particle_solver.hpp"
 #include "mpm/edges.hpp"
 #include "mpm/null_space.hpp"
 #include "mpm/small_nodes.hpp"
@@ -21,60 +18,34 @@ namespace testbed
 namespace
 {
 template <class Shape, class Strain>
-class Mpm final : public Solver
+class Mpm final : public ParticleSolver<Shape>
 {
 public:
     explicit Mpm(const Scene& scene)
-        : lattice_(without_numbers(make_lattice(scene.grid))),
-          bodies_(make_bodies(scene, make_lattice(scene.grid),
-                              {.box = Shape::has_box, .velocity = true, .initial_position = scene.body_force.has_value()})),
-          node_ops_(scene, make_lattice(scene.grid)),
+        : Base(scene, {.box = Shape::has_box, .velocity = true}),
+          lattice_(without_numbers(make_lattice(scene.grid))),
           nodes_(lattice_.nodes()),
           gather_(lattice_.nodes()),
           options_(scene.mpm),
           increment_{scene.mpm.increment == MpmSpec::Increment::midpoint ? 0.5 : 0.0},
-          least_mass_(options_.mass_cutoff * mass_of_a_full_node())
+          least_mass_(options_.mass_cutoff * cloud_.least_node_mass(lattice_.cell_size))
     {
         if (options_.transfer == MpmSpec::Transfer::xpic)
             xpic_.emplace(options_.xpic_order);
-        if (scene.body_force)
-            body_force_.emplace(*scene.body_force, scene.expression_constants());
-        if (!scene.tractions.empty())
-            tractions_.emplace(scene);
-        if (has_nonlocal_softening(scene))
-            nonlocal_.emplace(scene, lattice_.cell_size);
-        if (scene.time.density_scaling)
-            node_ops_.weigh_with(weight_.emplace().nodes);
-        if (scene.damping)
-            damping_ = scene.damping->local;
         rebuild();
     }
 
     void do_prepare(const Step& step) override
     {
-        const double t = step.t, dt = step.dt;
-        node_ops_.begin_step(t, dt);
-        timer_("bins",
-               [&]
-               {
-                   if (moved_)
-                       rebuild();
-               });
-        if (nonlocal_)
-            timer_("nonlocal strain", [&]
-                   { nonlocal_->template apply<Shape>(lattice_, bodies_, gather_, [&](int i, int j) { return lattice_.node(i, j); }); });
+        node_ops_.begin_step(step.t, step.dt);
+        if (cloud_.has_moved())
+            timer_("bins", [&] { rebuild(); });
+        if (cloud_.nonlocal)
+            timer_(
+                "nonlocal strain", [&]
+                { cloud_.nonlocal->template apply<Shape>(lattice_, bodies_, gather_, [&](int i, int j) { return lattice_.node(i, j); }); });
         if (options_.scheme == MpmSpec::Scheme::usf)
-        {
-            timer_("points to nodes",
-                   [&]
-                   {
-                       points_to_nodes<Scatter::momentum>();
-                       restrain_mapped_velocity();
-                   });
-            if (started_)
-                timer_("stress", [&] { update_stress(step.last_dt); });
-            timer_("points to nodes", [&] { points_to_nodes<Scatter::force>(); });
-        }
+            stress_first(step);
         else
             timer_("points to nodes",
                    [&]
@@ -82,27 +53,8 @@ public:
                        to_nodes<Scatter::momentum_and_force>(sums_.all());
                        restrain_mapped_velocity();
                    });
-        fold_forces();
-        internal_ = force_norm(nodes_);
-        if (body_force_)
-            timer_("forcing", [&] { body_force_->evaluate(bodies_, t); });
-        timer_("node operations",
-               [&]
-               {
-                   if (body_force_)
-                       node_ops_.apply_load(nodes_, [&] { add_body_force(); });
-                   if (tractions_)
-                       node_ops_.apply_load(nodes_,
-                                            [&]
-                                            {
-                                                tractions_->apply(lattice_, bodies_, nodes_, t);
-                                                fold_forces();
-                                            });
-                   if (weight_)
-                       find_weight();
-                   node_ops_.apply_forces(lattice_, nodes_, t);
-               });
-        lag_ = 0.5 * step.last_dt;
+        gather_forces();
+        this->apply_loads("node operations", lattice_, nodes_, step.t);
     }
 
     void do_advance(const Step& step) override
@@ -113,7 +65,6 @@ public:
         if (options_.null_space_filter == MpmSpec::Filter::cell)
             timer_("null-space filter", [&] { filter_points(); });
         timer_("acceleration", [&] { accelerate_and_keep_increment(step.kick()); });
-        started_ = true;
         const bool remap = options_.scheme == MpmSpec::Scheme::musl;
         timer_("nodes to points", [&] { update_velocity(remap); });
         switch (options_.scheme)
@@ -123,7 +74,7 @@ public:
                    [&]
                    {
                        keep_velocity(carrier_x_, carrier_y_);
-                       to_nodes<Scatter::momentum>(workspace_);
+                       to_nodes<Scatter::momentum>(cloud_.workspace);
                        node_ops_.restrain(lattice_, nodes_, nodes_.vx, nodes_.vy, false);
                        extend(nodes_.vx, nodes_.vy);
                    });
@@ -141,7 +92,7 @@ public:
     /// that of the nodes.
     MotionSums sums() const override
     {
-        MotionSums s = nodal_sums(lattice_, nodes_, lag_, internal_);
+        MotionSums s = nodal_sums(lattice_, nodes_, this->lag(), internal_);
         s.kinetic_energy += point_motion().kinetic_energy - s.kinetic_before;
         return s;
     }
@@ -152,38 +103,25 @@ public:
     /// With MUSL the strain is that of a velocity mapped once more, with XPIC the points move otherwise.
     std::optional<NodalWork> work() const override
     {
-        NodalWork work = node_ops_.work(nodes_, lag_);
+        NodalWork work = node_ops_.work(nodes_, this->lag());
         work.of_strain = options_.scheme != MpmSpec::Scheme::musl && !xpic_;
         return work;
     }
-    NodalWork* work_done() override { return &node_ops_.work_done(); }
     std::pair<const Lattice*, const Nodes*> nodes() const override { return {&lattice_, &nodes_}; }
-    const std::vector<Body>& bodies() const override { return bodies_; }
     Vec2 velocity(std::size_t body, std::size_t p) const override { return {bodies_[body].points.vx[p], bodies_[body].points.vy[p]}; }
     std::size_t unknowns() const override { return 2 * nodes_with_mass(nodes_); }
-    std::size_t active_cells() const override
-    {
-        std::size_t n = 0;
-        for (const Body& body : bodies_)
-            n += body.bins.list().size();
-        return n;
-    }
+    std::size_t active_cells() const override { return cloud_.number_of_bins(); }
     std::size_t bytes() const override
     {
-        return bytes_of(bodies_) + nodes_.bytes() + gather_.bytes() + edges_.bytes() + small_.bytes() + sums_.bytes() +
-               (xpic_ ? xpic_->bytes() : 0) +
-               (workspace_.capacity() + carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity()) *
-                   sizeof(double) +
-               (body_force_ ? body_force_->bytes() : 0) + (nonlocal_ ? nonlocal_->bytes() : 0) + (weight_ ? weight_->bytes() : 0);
+        const std::size_t numbers = carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity();
+        return this->bytes_of_points_and_loads() + nodes_.bytes() + gather_.bytes() + edges_.bytes() + small_.bytes() + sums_.bytes() +
+               (xpic_ ? xpic_->bytes() : 0) + numbers * sizeof(double);
     }
     void write_state(StateWriter& writer) override { state(writer); }
     void read_state(StateReader& reader) override { state(reader); }
-    const PhaseTimer& timer() const override { return timer_; }
-    std::vector<RestraintRecord> restraints() const override { return node_ops_.records(); }
-    const char* kinematics() const override { return "hypoelastic"; }
     std::vector<StepLimit> step_limits() override
     {
-        if (moved_)
+        if (cloud_.has_moved())
             rebuild();
         return mpm_step_limits<Shape>(lattice_, bodies_, options_, damping_);
     }
@@ -198,17 +136,17 @@ public:
     }
 
 private:
-    static constexpr int S = Shape::S;
+    using Base = ParticleSolver<Shape>;
+    using Base::bodies_, Base::body_force_, Base::cloud_, Base::damping_, Base::node_ops_, Base::S, Base::timer_, Base::weight_,
+        Base::internal_;
     static constexpr bool reaches_beyond = std::is_same_v<Shape, BSplineShape>;  ///< the lattice's edge
 
     template <class Archive>
     void state(Archive& a)
     {
-        for (Body& body : bodies_)
-            body.state(a);
+        cloud_.state(a);
         node_ops_.state(a);
-        a.value("started", "-", started_);
-        a.value("last_dt", "s", last_dt_);
+        a.value("last_dt", "s", this->last_dt_);
         Lattice lattice = lattice_;
         lattice.state(a);
         if constexpr (Archive::reads)
@@ -220,40 +158,40 @@ private:
     {
         if (lattice.numbered != lattice_.numbered)
             renumber(lattice);
-        std::vector<const Bins*> bins;
-        moved_ = false;
-        for (const Body& body : bodies_)
-        {
-            bins.push_back(&body.bins);
-            moved_ |= body.bins.has_marks();
-        }
-        find_nodes(bins);
+        find_nodes(cloud_.bins());
         if (options_.scheme != MpmSpec::Scheme::usf)
             sums_.update(lattice_, bodies_);
     }
 
     void rebuild()
     {
-        std::vector<const Bins*> bins;
-        bool other_bins = false;
-        for (Body& body : bodies_)
-        {
-            other_bins |= body.bins.template rebuild<Shape>(body.points, workspace_);
-            bins.push_back(&body.bins);
-        }
+        const bool other_bins = cloud_.sort();
         if (other_bins)
         {
+            const std::vector<const Bins*> bins = cloud_.bins();
             if (const Lattice lattice = with_numbers_for<S>(lattice_, bins); lattice.numbered != lattice_.numbered)
                 renumber(lattice);
             find_nodes(bins);
         }
         if (options_.scheme != MpmSpec::Scheme::usf)
             other_bins ? sums_.update(lattice_, bodies_) : sums_.update_changed(lattice_, bodies_);
-        moved_ = false;
     }
 
-    /// The masses of the nodes that have weight.
-    void find_weight()
+    /// USF: the stress follows the velocity of the step that led here.
+    void stress_first(const Step& step)
+    {
+        timer_("points to nodes",
+               [&]
+               {
+                   points_to_nodes<Scatter::momentum>();
+                   restrain_mapped_velocity();
+               });
+        if (!step.is_first())
+            timer_("stress", [&] { update_stress(step.last_dt); });
+        timer_("points to nodes", [&] { points_to_nodes<Scatter::force>(); });
+    }
+
+    void find_weight() override
     {
         weight_->nodes.assign(nodes_.mass.size(), 0.0);
         const auto take = [&](std::size_t n, double mass) { weight_->nodes[n] = mass; };
@@ -261,10 +199,10 @@ private:
         {
             points_to_nodes<Scatter::momentum>();  // once more: the workspace holds forces now
             restrain_mapped_velocity();
-            weight_->collect<sums_of<Scatter::momentum>>(bodies_, gather_, workspace_, S * S, take);
+            weight_->template collect<sums_of<Scatter::momentum>>(bodies_, gather_, cloud_.workspace, S * S, take);
         }
         else
-            weight_->collect<sums_of<Scatter::momentum_and_force>>(bodies_, gather_, sums_.all(), S * S, take);
+            weight_->template collect<sums_of<Scatter::momentum_and_force>>(bodies_, gather_, sums_.all(), S * S, take);
         if constexpr (reaches_beyond)
             edges_.fold_mass(weight_->nodes);
     }
@@ -284,8 +222,8 @@ private:
     {
         nodes_.renumber(lattice_, to);
         gather_ = Gather(to.nodes());
-        if (nonlocal_)
-            nonlocal_->resize(to.node_stride(), to.nodes());
+        if (cloud_.nonlocal)
+            cloud_.nonlocal->resize(to.node_stride(), to.nodes());
         lattice_ = to;
     }
 
@@ -293,14 +231,14 @@ private:
     template <Scatter what>
     void points_to_nodes()
     {
-        make_room(workspace_, gather_.blocks() * sums_of<what>);
+        make_room(cloud_.workspace, gather_.blocks() * sums_of<what>);
         std::size_t first_bin = 0;
         for (const Body& body : bodies_)
         {
-            scatter<Shape, Strain, what>(lattice_, body, first_bin, workspace_);
+            scatter<Shape, Strain, what>(lattice_, body, first_bin, cloud_.workspace);
             first_bin += body.bins.list().size();
         }
-        to_nodes<what>(workspace_);
+        to_nodes<what>(cloud_.workspace);
     }
     /// The same from the sums of all bins.
     template <Scatter what>
@@ -344,7 +282,7 @@ private:
         nodes_.vx[i] *= inverse;
         nodes_.vy[i] *= inverse;
     }
-    void add_body_force()
+    void add_body_force() override
     {
         body_force_->template apply<Shape>(lattice_, bodies_, gather_,
                                            [&](std::size_t n, const std::array<double, 2>& f)
@@ -352,7 +290,7 @@ private:
                                                nodes_.fx[n] += f[0];
                                                nodes_.fy[n] += f[1];
                                            });
-        fold_forces();
+        gather_forces();
     }
     /// The nodes that do not count go to their neighbours; those that have none count all the same.
     void take_small_nodes(bool has_small)
@@ -371,14 +309,7 @@ private:
             }
         small_.fold_momentum(nodes_);
     }
-    double mass_of_a_full_node() const
-    {
-        double least = std::numeric_limits<double>::infinity();
-        for (const Body& body : bodies_)
-            least = std::min(least, body.points.mass / body.points.initial_volume);
-        return least * lattice_.cell_size * lattice_.cell_size;
-    }
-    void fold_forces()
+    void gather_forces() override
     {
         if constexpr (reaches_beyond)
         {
@@ -447,46 +378,10 @@ private:
         extend(nodes_.fx, nodes_.fy);
     }
 
-    /// kernel(body, bin, number of the bin among all, frame) for every bin of every body.
-    template <class Kernel>
-    void for_each_bin(Kernel&& kernel)
-    {
-        std::size_t first_bin = 0;
-        for (Body& body : bodies_)
-        {
-            for_each_bin_of(body, first_bin, kernel);
-            first_bin += body.bins.list().size();
-        }
-    }
-    /// The same with the law of the body: kernel(body, law, bin, number, frame).
-    template <class Kernel>
-    void for_each_bin_with_law(Kernel&& kernel)
-    {
-        std::size_t first_bin = 0;
-        for (Body& body : bodies_)
-        {
-            std::visit(
-                [&](const auto& law)
-                {
-                    for_each_bin_of(body, first_bin,
-                                    [&](Body& b, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_INLINE
-                                    { kernel(b, law, bin, number, frame); });
-                },
-                body.material);
-            first_bin += body.bins.list().size();
-        }
-    }
-    template <class Kernel>
-    void for_each_bin_of(Body& body, std::size_t first_bin, Kernel&& kernel)
-    {
-        const auto& bins = body.bins.list();
-        parallel_for(bins.size(), [&](std::size_t b) { kernel(body, bins[b], first_bin + b, BinFrame(lattice_, bins[b])); });
-    }
-
     void update_velocity(bool remap)
     {
         if (remap)
-            make_room(workspace_, gather_.blocks() * sums_of<Scatter::momentum>);
+            make_room(cloud_.workspace, gather_.blocks() * sums_of<Scatter::momentum>);
         if (xpic_)
             update_velocity(*xpic_, remap);
         else if (options_.flip < 1)
@@ -504,27 +399,27 @@ private:
     void update_velocity(Update& rule)
     {
         using Momentum = NodeSums<Shape, Strain, Scatter::momentum>;
-        for_each_bin(
-            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
-            {
-                Points& q = body.points;
-                const auto update = rule.template in_bin<S>(lattice_, nodes_, body, bin);
-                for_each_pack(bin.begin, bin.end,
-                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                              {
-                                  const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                                  update.update(q, p, lanes, at);
-                              });
-                if constexpr (with_remap)
-                    sum_bin<Shape, Momentum>(lattice_, body, bin, &workspace_[number * Momentum::numbers]);
-            });
+        cloud_.for_each_bin(lattice_,
+                            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+                            {
+                                Points& q = body.points;
+                                const auto update = rule.template in_bin<S>(lattice_, nodes_, body, bin);
+                                for_each_pack(bin.begin, bin.end,
+                                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                                              {
+                                                  const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
+                                                  update.update(q, p, lanes, at);
+                                              });
+                                if constexpr (with_remap)
+                                    sum_bin<Shape, Momentum>(lattice_, body, bin, &cloud_.workspace[number * Momentum::numbers]);
+                            });
     }
 
     /// What XPIC keeps of the velocity of the points, on the nodes.
     void filter_velocity()
     {
         const bool driven = node_ops_.restrains();
-        make_room(workspace_, gather_.blocks() * SmoothedSums<Shape>::Q);
+        make_room(cloud_.workspace, gather_.blocks() * SmoothedSums<Shape>::Q);
         xpic_->filter(nodes_, driven ? mapped_x_ : nodes_.vx, driven ? mapped_y_ : nodes_.vy,
                       [&](std::vector<double>& x, std::vector<double>& y) { smooth(x, y); });
         extend(xpic_->kept_x(), xpic_->kept_y());
@@ -535,16 +430,16 @@ private:
     {
         using Smoothed = SmoothedSums<Shape>;
         extend(x, y);
-        for_each_bin(
-            [&](const Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
-            {
-                Smoothed sums(lattice_, bin, x, y);
-                for_each_pack(bin.begin, bin.end,
-                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                              { sums.add(body.points, lanes, frame.template corner<Shape>(body.points, p, lanes)); });
-                sums.write(&workspace_[number * Smoothed::numbers]);
-            });
-        gather_.template sum<2>(workspace_,
+        cloud_.for_each_bin(lattice_,
+                            [&](const Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+                            {
+                                Smoothed sums(lattice_, bin, x, y);
+                                for_each_pack(bin.begin, bin.end,
+                                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                                              { sums.add(body.points, lanes, frame.template corner<Shape>(body.points, p, lanes)); });
+                                sums.write(&cloud_.workspace[number * Smoothed::numbers]);
+                            });
+        gather_.template sum<2>(cloud_.workspace,
                                 [&](std::size_t i, const std::array<double, 2>& s)
                                 {
                                     x[i] = s[0];
@@ -568,18 +463,13 @@ private:
     void move_by_filter(double dt)
     {
         const bool sum = options_.scheme != MpmSpec::Scheme::usf;
-        std::atomic<bool> moved{moved_};
-        for_each_bin(
-            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
-            {
-                xpic_->move(body, bin, dt);
-                if (sum ? sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number)) : any_left(body.points, bin, frame))
-                {
-                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
-                    moved.store(true, std::memory_order_relaxed);
-                }
-            });
-        moved_ = moved;
+        cloud_.for_each_bin(lattice_,
+                            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+                            {
+                                xpic_->move(body, bin, dt);
+                                if (sum ? sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number)) : any_left(body.points, bin, frame))
+                                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
+                            });
     }
     static bool any_left(const Points& q, const Bin& bin, const BinFrame& frame)
     {
@@ -592,26 +482,27 @@ private:
     void filter_points()
     {
         if constexpr (std::is_same_v<Shape, LinearShape>)
-            for_each_bin([](Body& body, const Bin& bin, std::size_t, const BinFrame& frame)
-                         { filter_null_space<Shape>(frame, body.points, bin); });
+            cloud_.for_each_bin(lattice_, [](Body& body, const Bin& bin, std::size_t, const BinFrame& frame)
+                                { filter_null_space<Shape>(frame, body.points, bin); });
     }
 
     /// Stress alone, with the nodal velocity (USF).
     void update_stress(double dt)
     {
-        for_each_bin_with_law(
-            [&](Body& body, const auto& law, const Bin& bin, std::size_t, const BinFrame& frame)
-            {
-                Points& q = body.points;
-                const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
-                const NodalVelocity<S> v(lattice_, bin, nodes_.vx, nodes_.vy);
-                for_each_pack(bin.begin, bin.end,
-                              [&](std::size_t p, const auto& lanes)
-                              {
-                                  const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
-                                  law.update(q, p, lanes, increment_.of(v.template gradient<Strain>(at, strain, dt)));
-                              });
-            });
+        cloud_.for_each_bin_with_law(lattice_,
+                                     [&](Body& body, const auto& law, const Bin& bin, std::size_t, const BinFrame& frame)
+                                     {
+                                         Points& q = body.points;
+                                         const typename Strain::template InBin<Shape> strain(lattice_, q, bin);
+                                         const NodalVelocity<S> v(lattice_, bin, nodes_.vx, nodes_.vy);
+                                         for_each_pack(bin.begin, bin.end,
+                                                       [&](std::size_t p, const auto& lanes)
+                                                       {
+                                                           const ShapeAt<Shape> at(frame.corner<Shape>(q, p, lanes), frame.scale);
+                                                           law.update(q, p, lanes,
+                                                                      increment_.of(v.template gradient<Strain>(at, strain, dt)));
+                                                       });
+                                     });
     }
 
     /// Position with the carrier velocity; volume or box with the nodal velocity. If the stress is not updated first: stress, too, and the
@@ -619,8 +510,8 @@ private:
     template <bool with_stress>
     void move_points(const std::vector<double>& carrier_x, const std::vector<double>& carrier_y, double dt)
     {
-        std::atomic<bool> moved{false};
-        for_each_bin_with_law(
+        cloud_.for_each_bin_with_law(
+            lattice_,
             [&](Body& body, const auto& law, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
             {
                 Points& q = body.points;
@@ -646,17 +537,11 @@ private:
                 if constexpr (with_stress)
                     left |= sum_bin<Shape, Sums>(lattice_, body, bin, sums_.of(number));
                 if (left)
-                {
                     body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
-                    moved.store(true, std::memory_order_relaxed);
-                }
             });
-        moved_ = moved;
     }
 
     Lattice lattice_;
-    std::vector<Body> bodies_;
-    NodeOps node_ops_;
     Nodes nodes_;
     Gather gather_;
     LatticeEdges edges_;  ///< empty where shapes end at the edge
@@ -667,16 +552,8 @@ private:
     StrainIncrement increment_;
     double least_mass_;  ///< of a node that counts [kg/m]
     std::optional<Xpic> xpic_;
-    std::vector<double> workspace_;  ///< sums of the remapped momentum, and the way of a field to its new order
     std::vector<double> carrier_x_, carrier_y_;
     std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls
-    std::optional<BodyForce> body_force_;
-    std::optional<Tractions> tractions_;
-    std::optional<NonlocalStrain> nonlocal_;
-    std::optional<NodalWeight> weight_;
-    PhaseTimer timer_;
-    double damping_ = 0, internal_ = 0, lag_ = 0;
-    bool moved_ = false, started_ = false;
 };
 }  // namespace
 

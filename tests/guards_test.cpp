@@ -3,7 +3,10 @@
 #include "core/run/balance_guards.hpp"
 #include "core/run/diagnosis.hpp"
 #include "core/run/field_guards.hpp"
+#include "core/run/motion_guards.hpp"
 #include "core/run/observer.hpp"
+#include "core/run/parts_guards.hpp"
+#include "core/run/unresolved.hpp"
 #include "scenes.hpp"
 #include "tests/solvers.hpp"
 

@@ -10,6 +10,7 @@ struct Step
     double t, dt;
     double last_dt;  ///< zero in the first step: the initial velocity is that of t = 0, and the first kick is half a step
 
+    bool is_first() const { return last_dt == 0; }
     double kick() const { return 0.5 * (last_dt + dt); }
 };
 }  // namespace testbed

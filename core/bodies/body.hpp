@@ -38,6 +38,13 @@ struct PointNeeds
     bool velocity = false;         ///< velocity on the points
     bool initial_position = true;  ///< kept with the points, for what is evaluated there in each step
     bool strength = true;          ///< else the elastic part of a law is all that is asked
+
+    PointNeeds with_initial_position(bool needed) const
+    {
+        PointNeeds needs = *this;
+        needs.initial_position = needed;
+        return needs;
+    }
 };
 
 Lattice make_lattice(const GridSpec& grid);
@@ -45,4 +52,16 @@ Lattice make_lattice(const GridSpec& grid);
 /// The bodies of a scene with their initial velocity if the method keeps it on the points.
 /// @throws SceneError when a body has no points or a material parameter is out of range at a point
 std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointNeeds needs);
+
+/// Bytes of the arrays of all points and of their order.
+inline std::size_t bytes_of(const std::vector<Body>& bodies)
+{
+    std::size_t total = 0;
+    for (const Body& body : bodies)
+    {
+        body.points.for_each_field([&](const auto& field) { total += field.bytes(); });
+        total += body.bins.bytes();
+    }
+    return total;
+}
 }  // namespace testbed

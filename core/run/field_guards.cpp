@@ -1,6 +1,7 @@
 #include "core/run/field_guards.hpp"
 
 #include "core/bodies/point_sums.hpp"
+#include "core/run/unresolved.hpp"
 
 #include <cmath>
 #include <fmt/format.h>
@@ -11,94 +12,6 @@ namespace testbed
 {
 namespace
 {
-/// Values at the nodes that a body's points touch, on the smallest box of cells around them.
-class NodeAverage
-{
-public:
-    NodeAverage(const Points& q, const Vec2& origin, double cell_size) : q_(q), origin_(origin), cell_size_(cell_size)
-    {
-        Vec2 low{q.x[0], q.y[0]}, high = low;
-        for (std::size_t p = 0; p < q.count; ++p)
-        {
-            low = {std::min(low[0], q.x[p]), std::min(low[1], q.y[p])};
-            high = {std::max(high[0], q.x[p]), std::max(high[1], q.y[p])};
-        }
-        const double room = ((high[0] - low[0]) / cell_size + 2) * ((high[1] - low[1]) / cell_size + 2);
-        const double far = std::max({std::abs(low[0]), std::abs(low[1]), std::abs(high[0]), std::abs(high[1])}) / cell_size;
-        is_compact_ = room < 64.0 * static_cast<double>(q.count + 1024) && far < 1e9;
-        if (!is_compact_)
-            return;
-        i0_ = static_cast<int>(std::floor((low[0] - origin[0]) / cell_size));
-        j0_ = static_cast<int>(std::floor((low[1] - origin[1]) / cell_size));
-        stride_ = static_cast<std::size_t>((high[0] - low[0]) / cell_size) + 3;
-        nodes_ = stride_ * (static_cast<std::size_t>((high[1] - low[1]) / cell_size) + 3);
-    }
-    /// A body in parts far from each other is not worth the memory of all between them.
-    bool is_compact() const { return is_compact_; }
-
-    /// Each point's own value less the average about it. @param value (point)
-    template <class Value>
-    std::vector<double> difference(Value&& value) const
-    {
-        std::vector<double> sum(nodes_, 0.0), volume(nodes_, 0.0), rest(q_.count);
-        for (std::size_t p = 0; p < q_.count; ++p)
-            at_corners(p,
-                       [&](std::size_t n, double weight)
-                       {
-                           sum[n] += weight * q_.current_volume(p) * value(p);
-                           volume[n] += weight * q_.current_volume(p);
-                       });
-        for (std::size_t p = 0; p < q_.count; ++p)
-        {
-            rest[p] = value(p);
-            at_corners(p, [&](std::size_t n, double weight) { rest[p] -= volume[n] > 0 ? weight * sum[n] / volume[n] : 0; });
-        }
-        return rest;
-    }
-
-private:
-    std::pair<int, int> cell(std::size_t p) const
-    {
-        return {static_cast<int>(std::floor((q_.x[p] - origin_[0]) / cell_size_)),
-                static_cast<int>(std::floor((q_.y[p] - origin_[1]) / cell_size_))};
-    }
-    template <class F>
-    void at_corners(std::size_t p, F&& f) const
-    {
-        const auto [i, j] = cell(p);
-        const double a = (q_.x[p] - origin_[0]) / cell_size_ - i, b = (q_.y[p] - origin_[1]) / cell_size_ - j;
-        const std::size_t n = static_cast<std::size_t>(i - i0_) + static_cast<std::size_t>(j - j0_) * stride_;
-        f(n, (1 - a) * (1 - b));
-        f(n + 1, a * (1 - b));
-        f(n + stride_, (1 - a) * b);
-        f(n + stride_ + 1, a * b);
-    }
-
-    const Points& q_;
-    Vec2 origin_;
-    double cell_size_;
-    int i0_ = 0, j0_ = 0;
-    std::size_t stride_ = 0, nodes_ = 0;
-    bool is_compact_ = true;
-};
-
-/// f(body, point, its stress less the average about it, the out-of-plane part of that) for elastic bodies.
-template <class F>
-void for_each_unresolved(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size, F&& f)
-{
-    for (const Body& body : bodies)
-    {
-        const Points& q = body.points;
-        const NodeAverage average(q, lattice.origin, cell_size);
-        if (!average.is_compact())
-            continue;
-        const auto rest = [&](const Field<double>& s) { return average.difference([&](std::size_t p) { return s[p]; }); };
-        const auto sxx = rest(q.sxx), syy = rest(q.syy), sxy = rest(q.sxy);
-        for (std::size_t p = 0; p < q.count; ++p)
-            f(body, p, SymTensor<>{sxx[p], syy[p], sxy[p]}, moduli(body.material).poissons_ratio() * (sxx[p] + syy[p]));
-    }
-}
-
 bool is_static(const GuardSample& s)
 {
     return s.motion.kinetic_before < limits::is_static * s.points.strain_energy;
@@ -311,39 +224,6 @@ private:
     double share_ = 0, contrast_ = 0;
 };
 }  // namespace
-
-double stress_error(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size)
-{
-    const auto square = [](double xx, double yy, double zz, double xy) { return xx * xx + yy * yy + zz * zz + 2 * xy * xy; };
-    double all = 0, rest = 0;
-    for_each_unresolved(bodies, lattice, cell_size,
-                        [&](const Body& body, std::size_t p, const SymTensor<>& r, double szz)
-                        {
-                            const Points& q = body.points;
-                            const double V = q.current_volume(p);
-                            all += V * square(q.sxx[p], q.syy[p], out_of_plane_stress(moduli(body.material), q, p), q.sxy[p]);
-                            rest += V * square(r.xx, r.yy, szz, r.xy);
-                        });
-    return all > 0 ? std::sqrt(rest / all) : 0;
-}
-
-double unresolved_energy(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size,
-                         const std::function<Vec2(std::size_t, std::size_t)>& velocity)
-{
-    double total = 0;
-    for_each_unresolved(bodies, lattice, cell_size,
-                        [&](const Body& body, std::size_t p, const SymTensor<>& r, double szz)
-                        {
-                            const double softer = body.points.stiffness.active() ? body.points.stiffness[p] : 1.0;
-                            total += body.points.current_volume(p) * elastic_energy_density(moduli(body.material), r, szz) / softer;
-                        });
-    for (std::size_t b = 0; b < bodies.size(); ++b)
-        if (const NodeAverage average(bodies[b].points, lattice.origin, cell_size); average.is_compact())
-            for (const std::size_t k : {0, 1})
-                for (const double rest : average.difference([&](std::size_t p) { return velocity(b, p)[k]; }))
-                    total += 0.5 * bodies[b].points.mass * rest * rest;
-    return total;
-}
 
 std::vector<std::unique_ptr<Guard>> field_guards(const Scene& scene)
 {

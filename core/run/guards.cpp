@@ -2,6 +2,7 @@
 
 #include "core/run/balance_guards.hpp"
 #include "core/run/field_guards.hpp"
+#include "core/run/parts_guards.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +12,6 @@ namespace testbed
 {
 namespace
 {
-bool has_strength(const Scene& scene, const BodySpec& body)
-{
-    return scene.material(body.material).has_strength();
-}
-
 class VolumeGuard final : public Remembering<VolumeGuard>
 {
 public:
@@ -118,124 +114,6 @@ private:
     double from_, largest_ = 0;
 };
 
-/// An elastic body that is in more parts than at the start was torn by the lattice, not by its law.
-class SeparationGuard final : public Remembering<SeparationGuard>
-{
-public:
-    explicit SeparationGuard(const Scene& scene) : reach_(reach_of(scene))
-    {
-        for (const BodySpec& body : scene.bodies)
-            bodies_.push_back({body.name, has_strength(scene, body)});
-    }
-    void watch(const GuardSample& s, const Solver& solver) override
-    {
-        if (!s.is_fresh)
-            return;
-        for (std::size_t b = 0; b < bodies_.size(); ++b)
-        {
-            Parts& own = bodies_[b];
-            own.now = connected_parts(solver.bodies()[b].bins.list(), reach_);
-            own.at_start = started_ ? own.at_start : own.now;
-            own.most = std::max(own.most, own.now);
-        }
-        started_ = true;
-    }
-    std::optional<Finding> finding(bool) const override
-    {
-        for (const Parts& b : bodies_)
-            if (!b.may_break && b.most > b.at_start)
-                return Finding{"separated", fmt::format("body '{}' came apart: {} parts between which no force passes, {} at the start",
-                                                        b.name, b.most, b.at_start)};
-        return std::nullopt;
-    }
-    std::string note() const
-    {
-        std::size_t off = 0;
-        for (const Parts& b : bodies_)
-            off += b.may_break && b.now > b.at_start ? b.now - b.at_start : 0;
-        return off ? fmt::format("parts that came off: {}", off) : "";
-    }
-
-    template <class Archive>
-    void state(Archive& a)
-    {
-        a.value("started", "-", started_);
-        a.column("at_start", "-", bodies_, &Parts::at_start);
-        a.column("now", "-", bodies_, &Parts::now);
-        a.column("most", "-", bodies_, &Parts::most);
-    }
-
-private:
-    struct Parts
-    {
-        std::string name;
-        bool may_break;
-        std::size_t at_start = 0, now = 0, most = 0;
-    };
-    int reach_;
-    bool started_ = false;
-    std::vector<Parts> bodies_;
-};
-
-/// Bodies on one lattice that touch are bonded; elastic ones have no reason to come off each other.
-class ContactGuard final : public Remembering<ContactGuard>
-{
-public:
-    explicit ContactGuard(const Scene& scene) : reach_(reach_of(scene))
-    {
-        for (const BodySpec& body : scene.bodies)
-            names_.push_back(body.name);
-        for (std::size_t a = 0; a < scene.bodies.size(); ++a)
-            for (std::size_t b = a + 1; b < scene.bodies.size(); ++b)
-                if (!has_strength(scene, scene.bodies[a]) && !has_strength(scene, scene.bodies[b]))
-                    bonds_.push_back({a, b});
-    }
-    void watch(const GuardSample& s, const Solver& solver) override
-    {
-        if (!s.is_fresh)
-            return;
-        const auto touch = [&](const Bond& bond)
-        { return in_contact(solver.bodies()[bond.a].bins.list(), solver.bodies()[bond.b].bins.list(), reach_); };
-        if (!started_)
-            std::erase_if(bonds_, [&](const Bond& bond) { return !touch(bond); });
-        started_ = true;
-        for (const Bond& bond : bonds_)
-            if (!lost_ && !touch(bond))
-                lost_ = bond;
-    }
-    std::optional<Finding> finding(bool) const override
-    {
-        if (lost_)
-            return Finding{"contact_lost",
-                           fmt::format("bodies '{}' and '{}' were bonded and came off each other", names_[lost_->a], names_[lost_->b])};
-        return std::nullopt;
-    }
-
-    template <class Archive>
-    void state(Archive& a)
-    {
-        a.value("started", "-", started_);
-        a.column("a", "-", bonds_, &Bond::a);
-        a.column("b", "-", bonds_, &Bond::b);
-        std::size_t first = lost_ ? lost_->a : 0, second = lost_ ? lost_->b : 0;  // a body has no bond with itself
-        a.value("lost_a", "-", first);
-        a.value("lost_b", "-", second);
-        if constexpr (Archive::reads)
-            lost_ = first == second ? std::nullopt : std::optional(Bond{first, second});
-    }
-
-private:
-    struct Bond
-    {
-        std::size_t a, b;
-    };
-    int reach_;
-    bool started_ = false;
-    std::vector<Bond> bonds_;
-    std::optional<Bond> lost_;
-    std::vector<std::string> names_;  ///< of the bodies
-};
-
 /// Largest strain component at the points of a method of small strain.
 class StrainGuard final : public Remembering<StrainGuard>
 {
@@ -309,74 +187,7 @@ bool is_to_rest(const Scene& scene)
     const bool ramped = scene.gravity && scene.gravity->ramp > 0 && scene.gravity->ramp < scene.time.end;
     return scene.time.stop_unbalanced || (!scene.may_flow() && damped && ramped && !moving);
 }
-
-using Key = std::pair<int, int>;
-
-std::vector<Key> places(const std::vector<Bin>& bins)
-{
-    std::vector<Key> keys;
-    keys.reserve(bins.size());
-    for (const Bin& bin : bins)
-        keys.emplace_back(bin.j, bin.i);
-    std::sort(keys.begin(), keys.end());
-    return keys;
-}
-
-/// f(number) for the keys within reach of one.
-template <class F>
-void for_each_near(const std::vector<Key>& keys, const Key& at, int reach, F&& f)
-{
-    for (int j = at.first - reach; j <= at.first + reach; ++j)
-        for (auto k = std::lower_bound(keys.begin(), keys.end(), Key{j, at.second - reach});
-             k != keys.end() && k->first == j && k->second <= at.second + reach; ++k)
-            f(static_cast<std::size_t>(k - keys.begin()));
-}
 }  // namespace
-
-std::size_t connected_parts(const std::vector<Bin>& bins, int reach)
-{
-    const std::vector<Key> keys = places(bins);
-    std::vector<bool> seen(keys.size());
-    std::vector<std::size_t> open;
-    std::size_t parts = 0;
-    for (std::size_t start = 0; start < keys.size(); ++start)
-    {
-        if (seen[start])
-            continue;
-        ++parts;
-        seen[start] = true;
-        open.assign(1, start);
-        while (!open.empty())
-        {
-            const Key at = keys[open.back()];
-            open.pop_back();
-            for_each_near(keys, at, reach,
-                          [&](std::size_t k)
-                          {
-                              if (!seen[k])
-                                  open.push_back(k);
-                              seen[k] = true;
-                          });
-        }
-    }
-    return parts;
-}
-
-bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach)
-{
-    const std::vector<Key> keys = places(b);
-    bool touch = false;
-    for (const Bin& bin : a)
-        for_each_near(keys, {bin.j, bin.i}, reach, [&](std::size_t) { touch = true; });
-    return touch;
-}
-
-int reach_of(const Scene& scene)
-{
-    if (family_of(scene) == Family::mpm)
-        return scene.mpm.shape == MpmSpec::Shape::linear ? 1 : 2;
-    return scene.lpfdm.support == LpfdmSpec::Support::point ? 1 : 2;
-}
 
 Guards::Guards(const Scene& scene, const Solver& solver, double dt_critical)
 {
@@ -395,10 +206,7 @@ Guards::Guards(const Scene& scene, const Solver& solver, double dt_critical)
     guards_.push_back(std::make_unique<VolumeGuard>(scene.may_flow()));
     guards_.push_back(std::make_unique<OutsideGuard>());
     guards_.push_back(std::make_unique<CourantGuard>(scene.grid.cell_size));
-    guards_.push_back(std::make_unique<ContactGuard>(scene));
-    auto separation = std::make_unique<SeparationGuard>(scene);
-    note_ = [guard = separation.get()] { return guard->note(); };
-    guards_.push_back(std::move(separation));
+    add(parts_guards(scene));
 }
 
 void Guards::watch(const GuardSample& sample, const Solver& solver)
@@ -426,6 +234,9 @@ std::vector<Finding> Guards::findings(bool completed) const
 
 std::string Guards::note() const
 {
-    return note_ ? note_() : "";
+    std::string notes;
+    for (const auto& guard : guards_)
+        notes += guard->note();
+    return notes;
 }
 }  // namespace testbed

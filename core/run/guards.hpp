@@ -42,6 +42,8 @@ public:
     virtual void at_end(const GuardSample&, const Solver&) {}
     /// What is wrong with the run up to the last sample. @param completed to the end of the scene
     virtual std::optional<Finding> finding(bool completed) const = 0;
+    /// What is worth a word and not wrong, or nothing.
+    virtual std::string note() const { return ""; }
     /// What it remembers from sample to sample, for a restart.
     virtual void write_state(StateWriter&) = 0;
     virtual void read_state(StateReader&) = 0;
@@ -93,7 +95,6 @@ public:
     /// After the last sample, unless the run diverged.
     void at_end(const Solver& solver);
     std::vector<Finding> findings(bool completed) const;
-    /// What is worth a word and not wrong: parts that came off where the law may break.
     std::string note() const;
     const std::optional<GuardSample>& last() const { return last_; }
     template <class Archive>
@@ -113,13 +114,6 @@ public:
 private:
     std::vector<std::unique_ptr<Guard>> guards_;
     std::optional<GuardSample> last_;
-    std::function<std::string()> note_;
 };
 
-/// Parts of a body between which no force passes: they share no node. @param reach bins (columns or lines) at which two still share one
-std::size_t connected_parts(const std::vector<Bin>& bins, int reach);
-/// Whether two bodies share a node.
-bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach);
-/// Bins at which two points still share a node.
-int reach_of(const Scene& scene);
 }  // namespace testbed

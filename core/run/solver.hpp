@@ -76,18 +76,6 @@ PointMotion point_motion_of(const std::vector<Body>& bodies, Velocity&& velocity
     return motion;
 }
 
-/// Bytes of the arrays of all points and of their order.
-inline std::size_t bytes_of(const std::vector<Body>& bodies)
-{
-    std::size_t total = 0;
-    for (const Body& body : bodies)
-    {
-        body.points.for_each_field([&](const auto& field) { total += field.bytes(); });
-        total += body.bins.bytes();
-    }
-    return total;
-}
-
 class Solver
 {
 public:
@@ -156,6 +144,9 @@ public:
     virtual bool is_static() const { return false; }
 
 protected:
+    /// Of the nodal velocity behind the forces of the last prepare() [s].
+    double lag() const { return 0.5 * step_.last_dt; }
+
     double last_dt_ = 0;  ///< of the step that led here; zero at the start [s]
 
 private:

@@ -135,6 +135,17 @@ std::vector<Vec2> fill(const Scene& scene, const BodySpec& body)
     return points;
 }
 
+std::vector<Vec2> initial_positions(const Scene& scene)
+{
+    std::vector<Vec2> all;
+    for (const BodySpec& body : scene.bodies)
+    {
+        const std::vector<Vec2> part = fill(scene, body);
+        all.insert(all.end(), part.begin(), part.end());
+    }
+    return all;
+}
+
 std::vector<std::uint32_t> numbers_without_inclusions(const Scene& scene, const BodySpec& body)
 {
     Scene alone = scene;

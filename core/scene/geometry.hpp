@@ -24,6 +24,9 @@ std::vector<Vec2> outline(const BodySpec& body);
 /// which goes without those points.
 std::vector<Vec2> fill(const Scene& scene, const BodySpec& body);
 
+/// Initial positions of the points of all bodies, body after body: by id [m]. Points need not carry them.
+std::vector<Vec2> initial_positions(const Scene& scene);
+
 /// For each point of a body its number among those that the body would have without inclusions.
 std::vector<std::uint32_t> numbers_without_inclusions(const Scene& scene, const BodySpec& body);
 

@@ -1,0 +1,16 @@
+#pragma once
+/// Guards over what hangs together: bodies that come apart, or off each other.
+
+#include "core/run/guards.hpp"
+
+namespace testbed
+{
+/// Parts of a body between which no force passes: they share no node. @param reach bins (columns or lines) at which two still share one
+std::size_t connected_parts(const std::vector<Bin>& bins, int reach);
+/// Whether two bodies share a node.
+bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach);
+/// Bins at which two points still share a node.
+int reach_of(const Scene& scene);
+/// separated, contact_lost.
+std::vector<std::unique_ptr<Guard>> parts_guards(const Scene& scene);
+}  // namespace testbed
