@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
+from ..grade import metrics
 from ..read.results import ResultError
 from .style import RAIL, nice_unit
 
@@ -154,6 +155,19 @@ def log_y(axis, low, high):
         axis.yaxis.set_minor_locator(NullLocator())
     else:
         axis.yaxis.set_minor_formatter(NullFormatter())
+
+
+def exact_of(errors):
+    """Labels of the series whose errors are all of rounding; none when no series has others."""
+    exact = {label for label, own in errors.items() if len(own) and all(e < metrics.ROUNDING for e in own)}
+    return set() if len(exact) == sum(len(own) > 0 for own in errors.values()) else exact
+
+
+def lower_edge(axis, at, label, style):
+    """Points that are exact to rounding, on the lower edge."""
+    axis.plot(at, [0.0] * len(at), transform=axis.get_xaxis_transform(), linestyle="none", marker=style.marker(label),
+              markersize=4.5, markerfacecolor="white", markeredgecolor=style.colour(label), clip_on=False, zorder=5)
+
 
 def rails(axis, lost, style, text):
     """Runs without a number above the axes, one row per series: hollow marker and a cross."""

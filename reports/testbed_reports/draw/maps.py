@@ -196,71 +196,121 @@ def _scale_axes(axis, view, width, height):
     axis.locator_params(axis="y", nbins=max(2, min(6, int(height / 0.35))))
 
 
-def field_maps(study, entry, style):
-    """Panels: variants across, snapshots down; errors, where there are any, below the values."""
-    notes, stripes = [], entry.get("deformed_grid", False)
-    runs = with_result(one_size(chosen(study, entry), entry), notes, completed=not entry.get("unfinished"))
-    series = [(label, run) for label, own in by_series(runs, entry, style).items() for run in own]
-    wanted = entry.get("snapshot", -1)
-    wanted = wanted if isinstance(wanted, list) else [wanted]
-    rows = [[(label, run, snapshot_of(run, index)) for label, run in series] for index in wanted]
-    snapshots = [s for row in rows for _, _, s in row]
-    layers = [Layer("", [[_stripes(s, entry) for _, _, s in row] for row in rows])] if stripes else _field_layers(rows, entry)
-    view = _view(snapshots)
-    ratio = (view[1] - view[0])[1] / (view[1] - view[0])[0]
+@dataclass
+class Layout:
+    """Lines of panels on a figure, in inches; a row of panels takes `bands` lines."""
+    width: float
+    lines: int
+    bands: int
+    columns: int
+    panel: tuple  # width and height of one
+    gap: float
+    left: float
+    edge: float  # where the colour bars stand
 
-    width, right = WIDTH[entry.get("width", "page")], 0.15 if stripes else RIGHT
-    left = LEFT + (0.18 if len(rows) > 1 else 0.0)  # times beside the rows
+    @property
+    def step(self):
+        return self.panel[1] + TOP
+
+    @property
+    def height(self):
+        return self.lines * self.step + BOTTOM + 0.02
+
+    def box(self, line, column):
+        """Where a panel stands, in shares of the figure."""
+        return [(self.left + column * (self.panel[0] + self.gap)) / self.width, (self.height - (line + 1) * self.step) / self.height,
+                self.panel[0] / self.width, self.panel[1] / self.height]
+
+    def bar(self, first, lines):
+        """Where the colour bar of some lines stands: (x, y, height)."""
+        room = lines * self.step - TOP
+        long = min(room, 3.0)
+        return self.edge, self.height - (first + lines) * self.step + (room - long) / 2, long
+
+
+def _layout(entry, labels, rows, layers, ratio):
+    """The layout for so many rows and layers of panels whose height is `ratio` times their width."""
+    width, right = WIDTH[entry.get("width", "page")], 0.15 if entry.get("deformed_grid", False) else RIGHT
+    left = LEFT + (0.18 if rows > 1 else 0.0)  # times beside the rows
     gap, room = 0.12, width - left - right
     most = max(1, int(room / (1.5 if ratio < 1 / 1.3 else 0.8)))
-    columns = min(entry.get("columns", most), len(series), max(1, int(room / 0.8)))
-    bands = math.ceil(len(series) / columns)
+    columns = min(entry.get("columns", most), len(labels), max(1, int(room / 0.8)))
+    bands = math.ceil(len(labels) / columns)
     if "columns" not in entry:
-        columns = math.ceil(len(series) / bands)  # rows of like length
+        columns = math.ceil(len(labels) / bands)  # rows of like length
     panel = (room - (columns - 1) * gap) / columns
     height = panel * ratio
     if height > TALLEST:  # tall and narrow bodies
         height, panel = TALLEST, TALLEST / ratio
         spread = (room - columns * panel) / max(1, columns - 1) if columns > 1 else 0
         gap = min(spread, 0.45)
-    step, lines = height + TOP, bands * len(rows)
-    total = lines * len(layers) * step + BOTTOM + 0.02
-    longest = max(len(label) for label, _ in series) * 0.07
+    longest = max(len(label) for label in labels) * 0.07
     edge = left + columns * panel + (columns - 1) * gap + 0.12 + min(max(0.0, (longest - panel) / 2), 0.3)  # of a long title
-    width = min(width, edge + right - 0.12)
-    figure = plt.figure(figsize=(width, total))
-    for number, layer in enumerate(layers):
-        mapped = None
-        for line, row in enumerate(rows):
-            time = where_of_title([s for _, _, s in row]).removeprefix("At ")
-            for k, (label, _, snapshot) in enumerate(row):
-                place = number * lines + line * bands + k // columns
-                axis = figure.add_axes([(left + (k % columns) * (panel + gap)) / width, (total - (place + 1) * step) / total,
-                                        panel / width, height / total])
-                if layer.data[line][k] is not None:
-                    mapped = _draw_points(axis, snapshot, layer.data[line][k], layer, entry)
-                _draw_walls(axis, snapshot, view)
-                _draw_curves(axis, snapshot, entry.get("curves", []))
-                _scale_axes(axis, view, panel, height)
-                axis.set_title(label, pad=3, fontsize=8 if len(label) * 0.07 < panel + gap else 6)
-                if k % columns:
-                    axis.tick_params(labelleft=False)
-                else:
-                    letter = f"({chr(ord('a') + line)}) {time}\n" if len(rows) > 1 else ""
-                    axis.set_ylabel(letter + "$y$ [m]")
-                if number == len(layers) - 1 and line == len(rows) - 1 and k + columns >= len(series):
-                    axis.set_xlabel("$x$ [m]")
-                else:
-                    axis.tick_params(labelbottom=False)
-        if mapped is not None and layer.cmap:
-            room, long = lines * step - TOP, min(lines * step - TOP, 3.0)
-            _bar(figure, mapped, layer, (edge, total - (number + 1) * lines * step + (room - long) / 2, long))
-    if len(rows) == 1:
-        notes.insert(0, where_of_title(snapshots))
-    if not stripes and "range" not in entry:
+    return Layout(min(width, edge + right - 0.12), bands * rows * layers, bands, columns, (panel, height), gap, left, edge)
+
+
+def _label_axes(axis, left, bottom, text):
+    """Titles and tick labels of a panel, where it stands at the left or the bottom."""
+    if left:
+        axis.set_ylabel(text + "$y$ [m]")
+    else:
+        axis.tick_params(labelleft=False)
+    if bottom:
+        axis.set_xlabel("$x$ [m]")
+    else:
+        axis.tick_params(labelbottom=False)
+
+
+def _draw_layer(figure, layout, first, layer, rows, view, entry):
+    """The panels of a layer, from the line `first` on, and its colour bar."""
+    mapped = None
+    for number, row in enumerate(rows):
+        top = first + number * layout.bands
+        time = where_of_title([s for _, _, s in row]).removeprefix("At ")
+        text = f"({chr(ord('a') + number)}) {time}\n" if len(rows) > 1 else ""
+        for k, (label, _, snapshot) in enumerate(row):
+            line, column = divmod(k, layout.columns)
+            axis = figure.add_axes(layout.box(top + line, column))
+            if layer.data[number][k] is not None:
+                mapped = _draw_points(axis, snapshot, layer.data[number][k], layer, entry)
+            _draw_walls(axis, snapshot, view)
+            _draw_curves(axis, snapshot, entry.get("curves", []))
+            _scale_axes(axis, view, *layout.panel)
+            axis.set_title(label, pad=3, fontsize=8 if len(label) * 0.07 < layout.panel[0] + layout.gap else 6)
+            _label_axes(axis, column == 0, top + layout.bands == layout.lines and k + layout.columns >= len(row), text)
+    if mapped is not None and layer.cmap:
+        _bar(figure, mapped, layer, layout.bar(first, layout.bands * len(rows)))
+
+
+def _notes(entry, snapshots):
+    notes = []
+    if not entry.get("deformed_grid", False) and "range" not in entry:
         notes.append("Colours span the 1st to 99th percentile")
     if entry.get("curves"):
         notes.append(f"Broken lines: reference {', '.join(entry['curves'])}".replace("_", " "))
     if any(_inclusions(s, entry).any() for s in snapshots):
         notes.append("Other bodies than the first are grey")
+    return notes
+
+
+def field_maps(study, entry, style):
+    """Panels: variants across, snapshots down; errors, where there are any, below the values."""
+    notes = []
+    runs = with_result(one_size(chosen(study, entry), entry), notes, completed=not entry.get("unfinished"))
+    series = [(label, run) for label, own in by_series(runs, entry, style).items() for run in own]
+    wanted = entry.get("snapshot", -1)
+    wanted = wanted if isinstance(wanted, list) else [wanted]
+    rows = [[(label, run, snapshot_of(run, index)) for label, run in series] for index in wanted]
+    snapshots = [s for row in rows for _, _, s in row]
+    layers = [Layer("", [[_stripes(s, entry) for _, _, s in row] for row in rows])] if entry.get("deformed_grid", False) else \
+        _field_layers(rows, entry)
+    view = _view(snapshots)
+    extent = view[1] - view[0]
+    layout = _layout(entry, [label for label, _ in series], len(rows), len(layers), extent[1] / extent[0])
+    figure = plt.figure(figsize=(layout.width, layout.height))
+    for number, layer in enumerate(layers):
+        _draw_layer(figure, layout, number * layout.bands * len(rows), layer, rows, view, entry)
+    if len(rows) == 1:
+        notes.insert(0, where_of_title(snapshots))
+    notes += _notes(entry, snapshots)
     return Drawing(figure, [run for _, run in series], [n for n in dict.fromkeys(notes) if n])

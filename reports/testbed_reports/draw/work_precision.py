@@ -8,8 +8,8 @@ from matplotlib.ticker import NullFormatter
 
 from ..grade import metrics
 from ..grade.targets import number
-from .drawing import Drawing, FigureError, by_series, chosen, log_y, name_of, rails
-from .style import RAIL, WIDTH, frame, legend_below, legend_shape
+from .drawing import Drawing, FigureError, by_series, chosen, exact_of, log_y, lower_edge, name_of, rails
+from .style import WIDTH, frame, legend_below, legend_shape
 
 AXES = {"solve_s": "Solve time [s]", "dofs": "Degrees of freedom"}
 ACCURACIES = (0.01, 0.001)
@@ -70,86 +70,122 @@ def front(points):
     return kept
 
 
-def work_precision(study, entry, style):
-    """Error against seconds or unknowns, or seconds against unknowns. Where a method ran with several settings at one cell size, all are
-    shown and its line joins those that nothing of its own beats (against unknowns: the fastest)."""
-    x, y = entry.get("x", "solve_s"), entry.get("y", "error")
-    runs, notes = chosen(study, entry), []
-    series, failing = {}, {}
+def _several(costs):
+    """Whether a method ran with several settings at one cell size."""
+    return len({c.L for c in costs}) < len(costs)
+
+
+def _points(costs, x, y):
+    return [(getattr(c, x), getattr(c, y)) for c in costs]
+
+
+def _collect(study, runs, entry, style):
+    """({label: [Cost]}, {label: x of its runs without a number}, notes) of all series."""
+    series, failing, notes = {}, {}, []
+    by_time = entry.get("x", "solve_s") == "solve_s"
     for label, own in by_series(runs, entry, style).items():
         series[label], lost = costs_of(own, entry, study.plan.get("cores"))
-        at = [run.value("solve_s") if x == "solve_s" else float(run.result.performance.get("dofs", math.nan)) for run in lost if run.result]
+        at = [run.value("solve_s") if by_time else float(run.result.performance.get("dofs", math.nan)) for run in lost if run.result]
         if at := sorted({a for a in at if a > 0}):
             failing[label] = at
         if without := sum(run.result is None for run in own):
             notes.append(f"{label}: {without} of {len(own)} runs have no result")
     if not any(series.values()):
         raise FigureError(f"no completed run has {entry['quantity']} {entry.get('norm', '')}".rstrip() + " and a solve time")
+    return series, failing, notes
+
+
+def _draw_front(axis, points):
+    """The Pareto front of all methods, a broad line."""
+    if points:
+        axis.plot(*zip(*points), color="0.82", linewidth=5.0, solid_capstyle="round", zorder=0)
+
+
+def _draw_costs(axis, costs, x, y, look):
+    """The settings of a method and the line through the best of them."""
+    points, several = _points(costs, x, y), _several(costs)
+    fastest = [min((c for c in costs if c.L == size), key=lambda c: c.solve_s) for size in {c.L for c in costs}]
+    if several:
+        axis.plot(*zip(*points), **{**look, "linestyle": "none", "markersize": 2.5, "alpha": 0.45})
+    axis.plot(*zip(*(front(points) if several and y == "error" else sorted(_points(fastest, x, y)))), **look)
+    if x == "solve_s" and not several:
+        data = np.array([(c.solve_s, c.error, c.solve_s - c.least_s, c.most_s - c.solve_s) for c in costs]).T
+        axis.errorbar(data[0], data[1], xerr=data[2:], color=look["color"], linestyle="none", elinewidth=0.7, capsize=1.8)
+    if any(c.busy for c in costs):
+        axis.plot(*zip(*[p for p, c in zip(points, costs) if c.busy]), linestyle="none", marker="o", markersize=6, markerfacecolor="none",
+                  markeredgecolor="0.7", markeredgewidth=0.5, zorder=1)
+
+
+def _cap(series, exact):
+    """Ten times the largest error on the coarsest cells: a method that diverges must not flatten the picture."""
+    coarsest = max(c.L or 0 for costs in series.values() for c in costs)
+    return 10 * max((c.error for label, costs in series.items() for c in costs if label not in exact and (c.L or 0) >= coarsest / 1.001),
+                    default=math.inf)
+
+
+def _scale_x(axis, series, failing, x):
+    """Wide enough for all costs, the range of times, and the runs without a number."""
+    costs = [c for own in series.values() for c in own]
+    every = [getattr(c, x) for c in costs] + [a for at in failing.values() for a in at]
+    if x == "solve_s":
+        every += [t for c in costs for t in (c.least_s, c.most_s)]
+    axis.set_xlim(min(every) / 1.5, max(every) * 1.5)
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlabel(AXES[x])
+
+
+def _title(entry, y):
+    """What the y axis is called."""
+    if y == "solve_s":
+        return AXES[y]
+    name = name_of(entry["quantity"], entry.get("norm", ""))
+    return f"Error of {name.lower()}" if "exact" in entry else name
+
+
+def _medians(series, x):
+    """The note on what the times are."""
+    ranges = x == "solve_s" and not any(_several(costs) for costs in series.values())
+    return "Medians of repeats" + (" with their range" if ranges else "") + "; set-up and output are left out"
+
+
+def work_precision(study, entry, style):
+    """Error against seconds or unknowns, or seconds against unknowns. Where a method ran with several settings at one cell size, all are
+    shown and its line joins those that nothing of its own beats (against unknowns: the fastest)."""
+    x, y, runs = entry.get("x", "solve_s"), entry.get("y", "error"), chosen(study, entry)
+    series, failing, notes = _collect(study, runs, entry, style)
     is_error = y == "error" and ("exact" in entry or metrics.is_error(entry["quantity"], entry.get("norm", "")))
-    exact = {label for label, costs in series.items() if is_error and costs and all(c.error < metrics.ROUNDING for c in costs)}
-    exact = set() if len(exact) == sum(bool(costs) for costs in series.values()) else exact
-    of = {label: [(getattr(c, x), getattr(c, y)) for c in costs] for label, costs in series.items()}
-    texts = {label: f"{label}: exact (≤ {number(max(c.error for c in series[label]))})" if label in exact else label for label in series}
+    exact = exact_of({label: [c.error for c in costs] for label, costs in series.items()}) if is_error else set()
+    texts = {label: f"{label}: exact (≤ {number(max(c.error for c in costs))})" if label in exact else label for label, costs in series.items()}
     width = WIDTH[entry.get("width", "column")]
     columns, rows = legend_shape(texts.values(), width)
     figure, axes = frame(width, 2.3, rows, rails=len(failing), left=0.62, right=0.12)
-    axis, handles = axes[0, 0], []
-    everything = [p for label, points in of.items() if label not in exact for p in points]
+    axis, handles = axes[0, 0], [Line2D([], [], **style.of(label), label=text) for label, text in texts.items()]
     if y == "error":
-        best = front(everything + [p for label in exact for p in of[label]])
-        best = [p for p in best if p[1] > metrics.ROUNDING or not is_error]
-        if best:
-            axis.plot(*zip(*best), color="0.82", linewidth=5.0, solid_capstyle="round", zorder=0)
+        best = front([p for costs in series.values() for p in _points(costs, x, y)])
+        _draw_front(axis, [p for p in best if p[1] > metrics.ROUNDING or not is_error])
         notes.append("The broad line is the Pareto front of all methods")
     for label, costs in series.items():
-        handles.append(Line2D([], [], **style.of(label), label=texts[label]))
-        look = style.of(label)
         if label in exact:
-            axis.plot([p[0] for p in of[label]], [0.0] * len(costs), transform=axis.get_xaxis_transform(), linestyle="none",
-                      marker=style.marker(label), markersize=4.5, markerfacecolor="white", markeredgecolor=style.colour(label), clip_on=False, zorder=5)
-            continue
-        if not costs:
-            continue
-        several = len({c.L for c in costs}) < len(costs)
-        fastest = [min((c for c in costs if c.L == size), key=lambda c: c.solve_s) for size in {c.L for c in costs}]
-        line = front(of[label]) if several and y == "error" else sorted((getattr(c, x), getattr(c, y)) for c in fastest)
-        if several:
-            axis.plot(*zip(*of[label]), **{**look, "linestyle": "none", "markersize": 2.5, "alpha": 0.45})
-        axis.plot(*zip(*line), **look)
-        if x == "solve_s" and not several:
-            data = np.array([(c.solve_s, c.error, c.solve_s - c.least_s, c.most_s - c.solve_s) for c in costs]).T
-            axis.errorbar(data[0], data[1], xerr=data[2:], color=look["color"], linestyle="none", elinewidth=0.7, capsize=1.8)
-        if any(c.busy for c in costs):
-            axis.plot(*zip(*[p for p, c in zip(of[label], costs) if c.busy]), linestyle="none", marker="o", markersize=6, markerfacecolor="none",
-                      markeredgecolor="0.7", markeredgewidth=0.5, zorder=1)
+            lower_edge(axis, [getattr(c, x) for c in costs], label, style)
+        elif costs:
+            _draw_costs(axis, costs, x, y, style.of(label))
     if any(c.busy for costs in series.values() for c in costs):
         notes.append("Circled: timed on a busy machine")
     axis.set_xscale("log")
     axis.set_yscale("log")
-    low, high = min(p[1] for p in everything), max(p[1] for p in everything)
-    if is_error:  # a method that diverges must not flatten the picture
-        coarsest = max(c.L or 0 for costs in series.values() for c in costs)
-        cap = 10 * max((c.error for label, costs in series.items() for c in costs if label not in exact and (c.L or 0) >= coarsest / 1.001), default=high)
-        if high > 1.6 * cap:
-            notes.append("Errors above the upper edge are off the scale")
-        high = min(high, cap)
-    log_y(axis, low / 1.6, high * 1.6)
-    every = [p[0] for points in of.values() for p in points] + [a for at in failing.values() for a in at]
-    if x == "solve_s":
-        every += [t for costs in series.values() for c in costs for t in (c.least_s, c.most_s)]
-    axis.set_xlim(min(every) / 1.5, max(every) * 1.5)
-    axis.xaxis.set_minor_formatter(NullFormatter())
-    axis.set_xlabel(AXES[x])
-    axis.set_ylabel(AXES["solve_s"] if y == "solve_s" else
-                    f"Error of {name_of(entry['quantity'], entry.get('norm', '')).lower()}" if "exact" in entry else
-                    name_of(entry["quantity"], entry.get("norm", "")))
+    heights = [getattr(c, y) for label, costs in series.items() if label not in exact for c in costs]
+    cap = _cap(series, exact) if is_error else math.inf
+    if max(heights) > 1.6 * cap:
+        notes.append("Errors above the upper edge are off the scale")
+    log_y(axis, min(heights) / 1.6, min(max(heights), cap) * 1.6)
+    _scale_x(axis, series, failing, x)
+    axis.set_ylabel(_title(entry, y))
     rails(axis, failing, style, "failed")
     legend_below(figure, handles, columns)
     if exact:
         notes.append("Methods that are exact to rounding stand on the lower edge")
     if "solve_s" in (x, y):
-        notes.insert(0, "Medians of repeats" + ("" if any(len({c.L for c in costs}) < len(costs) for costs in series.values()) or x != "solve_s"
-                                                else " with their range") + "; set-up and output are left out")
+        notes.insert(0, _medians(series, x))
     return Drawing(figure, runs, notes)
 
 

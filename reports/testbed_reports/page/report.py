@@ -8,7 +8,8 @@ from collections import Counter
 from datetime import datetime, timezone
 from pathlib import Path
 
-from ..draw.figures import FigureError, draw, label_of
+from ..draw.drawing import FigureError, label_of
+from ..draw.figures import draw
 from ..draw.style import RC, WIDTH, Style, plt
 from ..draw.table import Table, as_csv, as_latex
 from ..grade.dataset import read_study_folder, write_atomically
