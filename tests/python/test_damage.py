@@ -60,6 +60,19 @@ def test_files_of_other_codes_are_read_or_refused(tmp_path):
     assert read > COUNT // 20 and refused > COUNT // 10
 
 
+def test_what_is_no_longer_there_takes_no_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr(guarded, "_copies", {})
+    monkeypatch.setattr(guarded, "MOST_FILES", 3)
+    paths = [write_result(tmp_path / f"{k}.h5", sealed=False) for k in range(5)]
+    for count, path in enumerate(paths, start=1):
+        Result(path)
+        assert len(guarded._copies) == (count - 1) % 3 + 1
+    for _ in range(3):
+        paths[-1].touch()
+        Result(paths[-1])
+        assert sum(key[0] == str(paths[-1].resolve()) for key in guarded._copies) == 1
+
+
 def test_files_of_the_testbed_are_refused(tmp_path):
     """With a checksum no change goes through: not of a number, not a cut of a single byte."""
     whole, bad = declared(write_result(tmp_path / "whole.h5", sealed=False)), tmp_path / "result.h5"

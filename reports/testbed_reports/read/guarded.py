@@ -23,7 +23,7 @@ TRAILER_SIZE = 40
 SECONDS, BYTES_PER_SECOND = 20, 20e6  # of computing for a file, and more for a large one
 SPARE_MEMORY = 2 << 30
 
-MOST_BYTES = 512 << 20  # of such files that are kept
+MOST_BYTES, MOST_FILES = 512 << 20, 200  # of such files that are kept: each takes memory of the library, too
 
 _good = set()  # files with a checksum that holds
 _number = itertools.count()  # names of the copies, of which many may be open
@@ -47,7 +47,7 @@ def open_file(path):
         return
     key = (str(path.resolve()), status.st_ino, status.st_size, status.st_mtime_ns)
     if key not in _copies:
-        _forget_others(status.st_size)
+        _forget_others(key)
         try:
             _copies[key] = _copy_by_child(path, status.st_size)
         except DamagedError as error:
@@ -57,10 +57,12 @@ def open_file(path):
     yield _copies[key]
 
 
-def _forget_others(size):
-    """Makes room for a file."""
-    if size + sum(key[2] for key in _copies) > MOST_BYTES:
-        _copies.clear()  # h5py closes what nobody holds
+def _forget_others(key):
+    """Makes room for a file, and forgets what stood at its place before."""
+    for old in [k for k in _copies if k[0] == key[0]]:
+        del _copies[old]  # h5py closes what nobody holds
+    if key[2] + sum(k[2] for k in _copies) > MOST_BYTES or len(_copies) >= MOST_FILES:
+        _copies.clear()
 
 
 def _has_good_checksum(path, size):
