@@ -28,6 +28,12 @@ inline SymTensor<> elastic_stress(const ElasticModuli& moduli, const Gradient<>&
     return state.stress;
 }
 
+/// Of a point that has not moved.
+inline Place place_of(const dealii::Point<2>& X, double t = 0)
+{
+    return {X[0], X[1], X[0], X[1], t};
+}
+
 enum class MassKind
 {
     none,

@@ -65,9 +65,11 @@ struct Measurement
     std::size_t points = 0, cells = 0, steps = 0;
     double setup = 0, seconds = 0, fastest = 0;  ///< per step: median and least of ten slices [s]
     double bytes = 0, traffic = 0;               ///< per point
+    double triad = 0;                            ///< bandwidth of the same team [B/s]
     std::vector<std::pair<std::string, double>> phases;
 
     double rate() const { return static_cast<double>(points) / seconds; }
+    double share_of_bound() const { return rate() * traffic / triad; }
 };
 
 std::vector<std::string> settings(const std::string& law, double points)
@@ -126,17 +128,25 @@ Measurement measure(const std::string& method, const std::string& law, double po
     m.traffic = traffic(*solver);
     return m;
 }
-}  // namespace
 
-void bench(const BenchOptions& options, const MakeSolver& make_solver)
+/// What is measured: all that the options leave open.
+struct Plan
 {
-    std::vector<std::string> methods = options.methods,
-                             laws = options.laws.empty() ? std::vector<std::string>{"elastic", "mohr_coulomb"} : options.laws;
-    if (methods.empty())
+    std::vector<std::string> methods, laws;
+    std::vector<int> teams;
+};
+
+/// @throws SceneError
+Plan plan_of(const BenchOptions& options, int cores)
+{
+    Plan plan{options.methods, options.laws, options.threads};
+    if (plan.laws.empty())
+        plan.laws = {"elastic", "mohr_coulomb"};
+    if (plan.methods.empty())
         for (const Variant& v : variants())
             if (v.family != Family::fem)
-                methods.emplace_back(v.name);
-    for (const std::string& method : methods)
+                plan.methods.emplace_back(v.name);
+    for (const std::string& method : plan.methods)
         if (find_variant(method).family == Family::fem)
             throw SceneError("bench: the FEM reference has no particles");
     for (const double points : options.points)
@@ -144,62 +154,90 @@ void bench(const BenchOptions& options, const MakeSolver& make_solver)
             throw SceneError(fmt::format("bench: --points from 16 to 1e9, not {}", points));
     if (!(options.seconds > 0 && options.seconds <= 3600))
         throw SceneError(fmt::format("bench: --seconds above 0 and at most 3600, not {}", options.seconds));
-    const int all = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-    std::vector<int> teams = options.threads;
-    if (teams.empty())
-        teams = all > 1 ? std::vector<int>{1, all} : std::vector<int>{1};
+    if (plan.teams.empty())
+        plan.teams = cores > 1 ? std::vector<int>{1, cores} : std::vector<int>{1};
+    return plan;
+}
 
-    const double load = load_average();
-    const bool busy = load > 0.5 * all;
-    if (busy)
-        fmt::print(stderr, "warning: the load average is {:.2f}: the numbers are those of a busy machine, and are marked so\n", load);
-    std::vector<double> triad;
-    for (const int team : teams)
-        triad.push_back(triad_bandwidth(team));
-    fmt::print("{}, {} cores, commit {}, load {:.2f}\n", cpu_name(), all, build().commit, load);
+/// The machine and how busy it is before the first measurement.
+struct Machine
+{
+    int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    double load = load_average();
+
+    bool is_busy() const { return load > 0.5 * cores; }
+};
+
+void print_heading(const Machine& machine, const std::vector<int>& teams, const std::vector<double>& triad)
+{
+    fmt::print("{}, {} cores, commit {}, load {:.2f}\n", cpu_name(), machine.cores, build().commit, machine.load);
     for (std::size_t k = 0; k < teams.size(); ++k)
         fmt::print("triad, {} thread{}: {:.1f} GB/s\n", teams[k], teams[k] > 1 ? "s" : "", 1e-9 * triad[k]);
     fmt::print("{:<16} {:<13} {:>9} {:>7} {:>11} {:>11} {:>9} {:>9} {:>9}\n", "method", "law", "points", "threads", "Mpoint-st/s",
                "fastest", "B/point", "of bound", "set-up s");
+}
 
+void print_row(const Measurement& m)
+{
+    fmt::print("{:<16} {:<13} {:>9} {:>7} {:>11.1f} {:>11.1f} {:>9.1f} {:>9.2f} {:>9.2f}\n", m.method, m.law, m.points, m.team,
+               1e-6 * m.rate(), 1e-6 * static_cast<double>(m.points) / m.fastest, m.bytes, m.share_of_bound(), m.setup);
+    std::fflush(stdout);
+}
+
+/// The file with its heading, or a closed one without a path. @throws SceneError
+std::ofstream open_csv(const std::string& path, const Machine& machine)
+{
     std::ofstream csv;
-    if (!options.output.empty())
-    {
-        csv.open(options.output);
-        if (!csv)
-            throw SceneError(fmt::format("cannot write '{}': {}", options.output, std::strerror(errno)));
-        csv << fmt::format("# {}, {} cores, {}, {}, commit {}, load {:.2f}{}\n", cpu_name(), all, build().compiler, build().flags,
-                           build().commit, load, busy ? ", busy" : "")
-            << "method,law,points,cells,threads,steps,seconds_per_step,fastest_seconds_per_step,particle_steps_per_second,bytes_per_point,"
-               "traffic_bytes_per_point,triad_bytes_per_second,share_of_traffic_bound,setup_seconds,phases\n";
-    }
-    for (const std::string& law : laws)
-        for (const std::string& method : methods)
+    if (path.empty())
+        return csv;
+    csv.open(path);
+    if (!csv)
+        throw SceneError(fmt::format("cannot write '{}': {}", path, std::strerror(errno)));
+    csv << fmt::format("# {}, {} cores, {}, {}, commit {}, load {:.2f}{}\n", cpu_name(), machine.cores, build().compiler, build().flags,
+                       build().commit, machine.load, machine.is_busy() ? ", busy" : "")
+        << "method,law,points,cells,threads,steps,seconds_per_step,fastest_seconds_per_step,particle_steps_per_second,bytes_per_point,"
+           "traffic_bytes_per_point,triad_bytes_per_second,share_of_traffic_bound,setup_seconds,phases\n";
+    return csv;
+}
+
+std::string csv_row(const Measurement& m)
+{
+    std::vector<std::string> phases;
+    for (const auto& [name, seconds] : m.phases)
+        phases.push_back(fmt::format("{}: {:.4g}", name, seconds));
+    return fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.5g},{:.5g},{:.5g},{:.4g},{:.4g},\"{}\"\n", m.method, m.law, m.points,
+                       m.cells, m.team, m.steps, m.seconds, m.fastest, m.rate(), m.bytes, m.traffic, m.triad, m.share_of_bound(), m.setup,
+                       fmt::join(phases, "; "));
+}
+}  // namespace
+
+void bench(const BenchOptions& options, const MakeSolver& make_solver)
+{
+    const Machine machine;
+    const Plan plan = plan_of(options, machine.cores);
+    if (machine.is_busy())
+        fmt::print(stderr, "warning: the load average is {:.2f}: the numbers are those of a busy machine, and are marked so\n",
+                   machine.load);
+    std::vector<double> triad;
+    for (const int team : plan.teams)
+        triad.push_back(triad_bandwidth(team));
+    print_heading(machine, plan.teams, triad);
+    std::ofstream csv = open_csv(options.output, machine);
+    for (const std::string& law : plan.laws)
+        for (const std::string& method : plan.methods)
             for (const double points : options.points)
-                for (std::size_t k = 0; k < teams.size(); ++k)
-                {
-                    Measurement m;
+                for (std::size_t k = 0; k < plan.teams.size(); ++k)
                     try
                     {
-                        m = measure(method, law, points, teams[k], options.seconds, make_solver);
+                        Measurement m = measure(method, law, points, plan.teams[k], options.seconds, make_solver);
+                        m.triad = triad[k];
+                        print_row(m);
+                        csv << csv_row(m) << std::flush;
                     }
                     catch (const Diverged& e)
                     {
-                        fmt::print("{:<16} {:<13} {:>9.0f} {:>7} diverged: {}\n", method, law, points, teams[k], e.what());
-                        continue;
+                        fmt::print("{:<16} {:<13} {:>9.0f} {:>7} diverged: {}\n", method, law, points, plan.teams[k], e.what());
                     }
-                    const double share = m.rate() * m.traffic / triad[k];
-                    fmt::print("{:<16} {:<13} {:>9} {:>7} {:>11.1f} {:>11.1f} {:>9.1f} {:>9.2f} {:>9.2f}\n", method, law, m.points,
-                               teams[k], 1e-6 * m.rate(), 1e-6 * static_cast<double>(m.points) / m.fastest, m.bytes, share, m.setup);
-                    std::fflush(stdout);
-                    std::vector<std::string> phases;
-                    for (const auto& [name, seconds] : m.phases)
-                        phases.push_back(fmt::format("{}: {:.4g}", name, seconds));
-                    csv << fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.5g},{:.5g},{:.5g},{:.4g},{:.4g},\"{}\"\n", method, law,
-                                       m.points, m.cells, teams[k], m.steps, m.seconds, m.fastest, m.rate(), m.bytes, m.traffic, triad[k],
-                                       share, m.setup, fmt::join(phases, "; "))
-                        << std::flush;
-                }
     if (!options.output.empty() && !csv)
         throw OutputError(fmt::format("writing '{}' failed (disk full?)", options.output));
 }

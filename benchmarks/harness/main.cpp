@@ -161,96 +161,118 @@ std::vector<std::string> rest_of(int argc, char** argv, int from)
     return {argv + std::min(from, argc), argv + argc};
 }
 
+void add_bench_options(CLI::App& command, BenchOptions& options)
+{
+    command.add_option("--method", options.methods, "only these methods");
+    command.add_option("--law", options.laws, "elastic, mohr_coulomb")->check(CLI::IsMember({"elastic", "mohr_coulomb"}));
+    command.add_option("--points", options.points, "numbers of points, about, 16 to 1e9");
+    command.add_option("--threads", options.threads, "default: 1 and all")->check(CLI::Range(1, 1024));
+    command.add_option("--seconds", options.seconds, "of each measurement, at most 3600");
+    command.add_option("-o,--output", options.output,
+                       "write a CSV file, too; named bench.csv in a folder given to `testbed report` it goes into the report");
+}
+
+void add_modes_options(CLI::App& command, ModesOptions& options)
+{
+    add_scene_options(command, options.scene);
+    command.add_option("--at", options.at, "time of the state [s]; at least one step is made")->check(CLI::NonNegativeNumber);
+    command.add_option("--steps", options.steps, "steps of the map, such as those in which a body moves by a cell")
+        ->check(CLI::Range(1, 100000));
+    command.add_option("--top", options.top, "modes of each sort that are shown")->check(CLI::Range(1, 1000));
+    command.add_option("--frequency", options.frequency, "exact frequency of the mode that is shown first [Hz]")
+        ->check(CLI::PositiveNumber);
+    command.add_option("--tolerance", options.tolerance, "growth in the map that is not yet called unstable")->check(CLI::PositiveNumber);
+    command.add_flag("--no-critical-step", options.leave_out_critical, "leave out the bisection for the critical step");
+    command.add_flag("--json", options.json, "print JSON");
+    command.add_option("-o,--output", options.scene.output, "write shapes (.h5), a picture of them (.png) or a table (.csv)");
+}
+
+/// The subcommands, and what their options say.
+struct CommandLine
+{
+    CLI::App app{"Verification and research testbed: LPFDM, MPM and FEM for large soil deformation"};
+    RunOptions options;  ///< of run and check
+    bool resolved = false;
+    std::string law, csv, table;
+    BenchOptions bench_options;
+    ModesOptions modes_options;
+    CLI::App* run = app.add_subcommand("run", "run a scene and write a result file");
+    CLI::App* check = app.add_subcommand("check", "parse a scene and say what it would use");
+    CLI::App* point = app.add_subcommand("point", "drive a law alone along a strain path; CSV on stdout");
+    CLI::App* doc = app.add_subcommand("doc", "every table and key of a scene");
+    CLI::App* bench = app.add_subcommand("bench", "speed of the particle methods on this machine");
+    CLI::App* modes = app.add_subcommand("modes", "what small disturbances of a state grow to: modes, null modes, critical step");
+
+    CommandLine()
+    {
+        app.require_subcommand(1);
+        app.set_version_flag("--version", build().commit);
+        add_run_options(*run, options);
+        add_scene_options(*check, options);
+        check->add_flag("--resolved", resolved, "print the scene with all its defaults, as TOML");
+        point->add_option("law", law, "path file (TOML)")->required();
+        point->add_option("-o,--output", csv, "write here instead of stdout");
+        doc->add_option("table", table, "only this table");
+        add_bench_options(*bench, bench_options);
+        add_modes_options(*modes, modes_options);
+        app.add_subcommand("list", "methods and material laws");
+        app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
+        app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
+    }
+};
+
+/// @param csv where the curve goes; to stdout if empty
+void point(const std::string& law, const std::string& csv)
+{
+    const std::string text = drive_point(law);
+    if (csv.empty())
+        fmt::print("{}", text);
+    else
+        try
+        {
+            write_text(csv, text);
+        }
+        catch (const OutputError& e)
+        {
+            throw SceneError(e.what());  // nothing was lost: the user's to mend
+        }
+}
+
 int run(int argc, char** argv)
 {
     // study and report are programs of their own, found the way git finds its subcommands
     if (argc > 1 && (std::string(argv[1]) == "study" || std::string(argv[1]) == "report"))
         become(std::string("testbed-") + argv[1], rest_of(argc, argv, 2));
 
-    CLI::App app("Verification and research testbed: LPFDM, MPM and FEM for large soil deformation");
-    app.require_subcommand(1);
-    app.set_version_flag("--version", build().commit);
-    RunOptions options;
-    bool resolved = false;
-    std::string table;
-    CLI::App* run_command = app.add_subcommand("run", "run a scene and write a result file");
-    add_run_options(*run_command, options);
-    CLI::App* check_command = app.add_subcommand("check", "parse a scene and say what it would use");
-    add_scene_options(*check_command, options);
-    check_command->add_flag("--resolved", resolved, "print the scene with all its defaults, as TOML");
-    std::string law, csv;
-    CLI::App* point_command = app.add_subcommand("point", "drive a law alone along a strain path; CSV on stdout");
-    point_command->add_option("law", law, "path file (TOML)")->required();
-    point_command->add_option("-o,--output", csv, "write here instead of stdout");
-    CLI::App* doc_command = app.add_subcommand("doc", "every table and key of a scene");
-    doc_command->add_option("table", table, "only this table");
-    BenchOptions bench_options;
-    CLI::App* bench_command = app.add_subcommand("bench", "speed of the particle methods on this machine");
-    bench_command->add_option("--method", bench_options.methods, "only these methods");
-    bench_command->add_option("--law", bench_options.laws, "elastic, mohr_coulomb")->check(CLI::IsMember({"elastic", "mohr_coulomb"}));
-    bench_command->add_option("--points", bench_options.points, "numbers of points, about, 16 to 1e9");
-    bench_command->add_option("--threads", bench_options.threads, "default: 1 and all")->check(CLI::Range(1, 1024));
-    bench_command->add_option("--seconds", bench_options.seconds, "of each measurement, at most 3600");
-    bench_command->add_option("-o,--output", bench_options.output,
-                              "write a CSV file, too; named bench.csv in a folder given to `testbed report` it goes into the report");
-    ModesOptions modes_options;
-    CLI::App* modes_command = app.add_subcommand("modes", "what small disturbances of a state grow to: modes, null modes, critical step");
-    add_scene_options(*modes_command, modes_options.scene);
-    modes_command->add_option("--at", modes_options.at, "time of the state [s]; at least one step is made")->check(CLI::NonNegativeNumber);
-    modes_command->add_option("--steps", modes_options.steps, "steps of the map, such as those in which a body moves by a cell")
-        ->check(CLI::Range(1, 100000));
-    modes_command->add_option("--top", modes_options.top, "modes of each sort that are shown")->check(CLI::Range(1, 1000));
-    modes_command->add_option("--frequency", modes_options.frequency, "exact frequency of the mode that is shown first [Hz]")
-        ->check(CLI::PositiveNumber);
-    modes_command->add_option("--tolerance", modes_options.tolerance, "growth in the map that is not yet called unstable")
-        ->check(CLI::PositiveNumber);
-    modes_command->add_flag("--no-critical-step", modes_options.leave_out_critical, "leave out the bisection for the critical step");
-    modes_command->add_flag("--json", modes_options.json, "print JSON");
-    modes_command->add_option("-o,--output", modes_options.scene.output, "write shapes (.h5), a picture of them (.png) or a table (.csv)");
-    app.add_subcommand("list", "methods and material laws");
-    app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
-    app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
+    CommandLine line;
     try
     {
-        app.parse(argc, argv);
+        line.app.parse(argc, argv);
     }
     catch (const CLI::ParseError& e)
     {
-        return app.exit(e) == 0 ? 0 : static_cast<int>(ExitCode::bad_scene);
+        return line.app.exit(e) == 0 ? 0 : static_cast<int>(ExitCode::bad_scene);
     }
-    if (run_command->parsed())
+    if (line.run->parsed())
     {
-        const std::string method = load(options).scene.method;
+        const std::string method = load(line.options).scene.method;
         if (find_variant(method).family == Family::fem)
             become("testbed-fem", rest_of(argc, argv, 2));
-        return static_cast<int>(run_scene(options, make_particle_solver));
+        return static_cast<int>(run_scene(line.options, make_particle_solver));
     }
-    if (check_command->parsed())
-        check(options, resolved);
-    else if (point_command->parsed())
+    if (line.check->parsed())
+        check(line.options, line.resolved);
+    else if (line.point->parsed())
+        point(line.law, line.csv);
+    else if (line.bench->parsed())
+        bench(line.bench_options, make_particle_solver);
+    else if (line.modes->parsed())
     {
-        const std::string text = drive_point(law);
-        if (csv.empty())
-            fmt::print("{}", text);
-        else
-            try
-            {
-                write_text(csv, text);
-            }
-            catch (const OutputError& e)
-            {
-                throw SceneError(e.what());  // nothing was lost: the user's to mend
-            }
-    }
-    else if (bench_command->parsed())
-        bench(bench_options, make_particle_solver);
-    else if (modes_command->parsed())
-    {
-        if (const auto picture = modes(modes_options, make_particle_solver))
+        if (const auto picture = modes(line.modes_options, make_particle_solver))
             become("testbed-modes-plot", {picture->first, picture->second});
     }
-    else if (doc_command->parsed())
-        fmt::print("{}", scene_documentation(table));
+    else if (line.doc->parsed())
+        fmt::print("{}", scene_documentation(line.table));
     else
         list();
     return 0;

@@ -5,6 +5,7 @@
 #include "core/materials/make_material.hpp"
 #include "core/scene/geometry.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -19,6 +20,7 @@ struct PointParameters
     double truncated_share = 0;
 
     Varying varying() const { return {stiffness.size() > 1, cohesion.size() > 1}; }
+    double largest_stiffness() const { return *std::max_element(stiffness.begin(), stiffness.end()); }
 };
 
 class ParameterReader
@@ -92,6 +94,105 @@ void set_initial_stress(const std::array<std::string, 4>& text, const Constants&
         q.sxy[p] = stress[3].finite(here);
     }
 }
+
+/// The part of a body's law that the method asks for.
+MaterialSpec needed_material(const Scene& scene, const BodySpec& spec, PointNeeds needs)
+{
+    MaterialSpec material = scene.material(spec.material);
+    if (material.has_strength() && !needs.strength)
+        material.law = MaterialSpec::Law::linear_elastic;
+    return material;
+}
+
+/// A body without points yet; its law has the largest stiffness of them.
+Body empty_body(const Scene& scene, const BodySpec& spec, const MaterialSpec& material, const PointParameters& parameters,
+                const Lattice& lattice)
+{
+    const Varying varying = parameters.varying();
+    const Strength<> strength = material.has_strength() && !varying.strength
+                                    ? Strength<>{parameters.cohesion[0], std::sin(parameters.friction[0])}
+                                    : Strength<>{0, 0};
+    return {spec.name,
+            {},
+            make_material(material, {parameters.largest_stiffness(), material.poissons_ratio}, strength, scene.grid.cell_size, varying),
+            Bins(lattice),
+            scene.confinement ? scene.confinement->pressure : 0.0,
+            parameters.truncated_share};
+}
+
+/// Room for the fields of n squares of side h.
+void allocate(Body& body, std::size_t n, double h, double density, PointNeeds needs)
+{
+    Points& q = body.points;
+    q.count = n;
+    q.initial_volume = h * h;
+    q.mass = density * h * h;
+    for (Field<double>* field : {&q.x, &q.y, &q.sxx, &q.syy, &q.sxy})
+        field->activate(n);
+    if (needs.initial_position)
+    {
+        q.X.activate(n);
+        q.Y.activate(n);
+    }
+    q.id.activate(n);
+    if (needs.box)
+    {
+        q.half_x.activate(n, h / 2);
+        q.half_y.activate(n, h / 2);
+    }
+    else
+        q.volume.activate(n, h * h);
+    if (needs.velocity)
+    {
+        q.vx.activate(n);
+        q.vy.activate(n);
+    }
+    std::visit([&](const auto& law) { law.allocate(q); }, body.material);
+}
+
+void set_positions(const std::vector<Vec2>& positions, std::uint32_t first_id, Points& q)
+{
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        const Vec2& X = positions[p];
+        q.x[p] = X[0];
+        q.y[p] = X[1];
+        if (q.X.active())
+        {
+            q.X[p] = X[0];
+            q.Y[p] = X[1];
+        }
+        q.id[p] = first_id + static_cast<std::uint32_t>(p);
+    }
+}
+
+void set_parameters(const PointParameters& parameters, Points& q)
+{
+    const Varying varying = parameters.varying();
+    const double largest = parameters.largest_stiffness();
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        if (varying.stiffness)
+            q.stiffness[p] = parameters.stiffness[p] / largest;
+        if (varying.strength)
+        {
+            q.cohesion[p] = parameters.cohesion[p];
+            q.sin_friction[p] = std::sin(parameters.friction[p]);
+        }
+    }
+}
+
+void set_velocity(const Expr2& text, const Constants& constants, Points& q)
+{
+    const VectorExpression velocity(text, constants);
+    for (std::size_t p = 0; p < q.count; ++p)
+    {
+        const Vec2 v = velocity({.X = q.x[p], .Y = q.y[p], .x = q.x[p], .y = q.y[p]});
+        q.vx[p] = v[0];
+        q.vy[p] = v[1];
+    }
+}
+
 }  // namespace
 
 Lattice make_lattice(const GridSpec& grid)
@@ -111,77 +212,16 @@ std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointN
         if (positions.empty())
             throw SceneError(
                 fmt::format("{}: body '{}' has no points; it is smaller than the spacing of its points", scene.path, spec.name));
-        MaterialSpec material = scene.material(spec.material);
-        if (material.has_strength() && !needs.strength)
-            material.law = MaterialSpec::Law::linear_elastic;
-        const std::size_t n = positions.size();
+        const MaterialSpec material = needed_material(scene, spec, needs);
         const PointParameters parameters = read_parameters(scene, spec, material, positions, next_id);
-        const Varying varying = parameters.varying();
-        const double largest = *std::max_element(parameters.stiffness.begin(), parameters.stiffness.end());
-        const Strength<> strength = material.has_strength() && !varying.strength
-                                        ? Strength<>{parameters.cohesion[0], std::sin(parameters.friction[0])}
-                                        : Strength<>{0, 0};
-        bodies.push_back({spec.name,
-                          {},
-                          make_material(material, {largest, material.poissons_ratio}, strength, scene.grid.cell_size, varying),
-                          Bins(lattice),
-                          scene.confinement ? scene.confinement->pressure : 0.0,
-                          parameters.truncated_share});
-
+        bodies.push_back(empty_body(scene, spec, material, parameters, lattice));
         Points& q = bodies.back().points;
-        const double h = spacing(spec, scene.grid);
-        q.count = n;
-        q.initial_volume = h * h;
-        q.mass = material.density * h * h;
-        for (Field<double>* field : {&q.x, &q.y, &q.sxx, &q.syy, &q.sxy})
-            field->activate(n);
-        if (needs.initial_position)
-        {
-            q.X.activate(n);
-            q.Y.activate(n);
-        }
-        q.id.activate(n);
-        if (needs.box)
-        {
-            q.half_x.activate(n, h / 2);
-            q.half_y.activate(n, h / 2);
-        }
-        else
-            q.volume.activate(n, h * h);
-        if (needs.velocity)
-        {
-            q.vx.activate(n);
-            q.vy.activate(n);
-        }
-        std::visit([&](const auto& law) { law.allocate(q); }, bodies.back().material);
-        std::optional<VectorExpression> velocity;
+        allocate(bodies.back(), positions.size(), spacing(spec, scene.grid), material.density, needs);
+        set_positions(positions, next_id, q);
+        next_id += static_cast<std::uint32_t>(q.count);
+        set_parameters(parameters, q);
         if (needs.velocity && spec.velocity)
-            velocity.emplace(*spec.velocity, constants);
-        for (std::size_t p = 0; p < n; ++p)
-        {
-            const Vec2& X = positions[p];
-            q.x[p] = X[0];
-            q.y[p] = X[1];
-            if (needs.initial_position)
-            {
-                q.X[p] = X[0];
-                q.Y[p] = X[1];
-            }
-            q.id[p] = next_id++;
-            if (varying.stiffness)
-                q.stiffness[p] = parameters.stiffness[p] / largest;
-            if (varying.strength)
-            {
-                q.cohesion[p] = parameters.cohesion[p];
-                q.sin_friction[p] = std::sin(parameters.friction[p]);
-            }
-            if (velocity)
-            {
-                const Vec2 v = (*velocity)({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
-                q.vx[p] = v[0];
-                q.vy[p] = v[1];
-            }
-        }
+            set_velocity(*spec.velocity, constants, q);
         if (spec.initial_stress)
             set_initial_stress(*spec.initial_stress, constants, q);
     }

@@ -144,6 +144,118 @@ State with_all_marked(State state, const std::vector<Body>& bodies)
             mark = 1;
     return state;
 }
+
+/// Derivative with respect to one unknown by differences of both sides.
+struct Slope
+{
+    Eigen::VectorXd value;
+    bool has_kink;
+};
+
+/// The steps of a solver from a state and from those beside it, as vectors of the unknowns over their scales.
+class StepsAbout
+{
+public:
+    StepsAbout(Solver& solver, const State& about, const Lattice& lattice, const StepSettings& settings)
+        : solver_(solver),
+          settings_(settings),
+          base_(with_all_marked(about, solver.bodies())),
+          changed_(base_),
+          places_(solver, base_),
+          at_(places_.find(base_))
+    {
+        const StateScales scales = state_scales(solver.bodies(), lattice.cell_size);
+        for (std::size_t n = 0; n < places_.count(); ++n)
+            unknowns_.push_back(places_.unknown(n, base_, scales, lattice));
+        const State end = after(base_);
+        if (settings.steps > 1)
+            shift_ = places_.motion(base_, end, scales.length);
+        middle_ = values(end);
+    }
+
+    const std::vector<Unknown>& unknowns() const { return unknowns_; }
+    Eigen::Index count() const { return static_cast<Eigen::Index>(unknowns_.size()); }
+
+    /// With respect to unknown n.
+    Slope slope(Eigen::Index n, double difference)
+    {
+        double& number = number_of(changed_, n);
+        const double value = number, scale = scale_of(n);
+        const double high = value + difference * scale, low = value - difference * scale;
+        number = high;
+        const Eigen::VectorXd up = values(after(changed_));
+        number = low;
+        const Eigen::VectorXd down = values(after(changed_));
+        number = value;
+        return {(up - down) * (scale / (high - low)), (up - 2 * middle_ + down).norm() > kink * difference};
+    }
+
+    /// Derivative along a direction: all unknowns changed at once.
+    Eigen::VectorXd slope_along(const Eigen::VectorXd& direction, double difference)
+    {
+        const auto towards = [&](double length)
+        {
+            State all = base_;
+            for (Eigen::Index n = 0; n < count(); ++n)
+                number_of(all, n) += length * direction[n] * scale_of(n);
+            return values(after(all));
+        };
+        return (towards(difference) - towards(-difference)) / (2 * difference);
+    }
+
+private:
+    double& number_of(State& state, Eigen::Index n) const { return state.numbers[*at_[static_cast<std::size_t>(n)]]; }
+    double scale_of(Eigen::Index n) const { return unknowns_[static_cast<std::size_t>(n)].scale; }
+
+    State after(const State& start)
+    {
+        restore(solver_, start);
+        solver_.assume_last_step(settings_.dt);
+        for (int k = 0; k < settings_.steps; ++k)
+        {
+            solver_.prepare(settings_.t + k * settings_.dt, settings_.dt);
+            solver_.advance(settings_.dt);
+        }
+        return state_of(solver_);
+    }
+    Eigen::VectorXd values(const State& state) const
+    {
+        const auto found = places_.find(state, shift_);
+        Eigen::VectorXd values(count());
+        for (Eigen::Index n = 0; n < count(); ++n)
+        {
+            const auto& place = found[static_cast<std::size_t>(n)];
+            values[n] = place ? state.numbers[*place] / scale_of(n) : 0;
+        }
+        return values;
+    }
+
+    Solver& solver_;
+    const StepSettings settings_;
+    State base_, changed_;  ///< changed: but for one number the same
+    Places places_;
+    std::vector<std::optional<std::size_t>> at_;  ///< numbers of the unknowns in the base
+    std::vector<Unknown> unknowns_;
+    NodeIndex shift_{0, 0};   ///< of the body in the steps [cells]
+    Eigen::VectorXd middle_;  ///< after the steps from the base
+};
+
+/// See OneStepMap::excess, largest of some directions.
+double excess(StepsAbout& steps, const Eigen::MatrixXd& matrix, double difference)
+{
+    std::mt19937 random(1);
+    double largest = 0;
+    for (int k = 0; k < 4; ++k)
+    {
+        Eigen::VectorXd signs(steps.count());
+        for (double& sign : signs)
+            sign = random() % 2 == 0 ? 1 : -1;
+        const Eigen::VectorXd together = steps.slope_along(signs, difference);
+        const Eigen::VectorXd sum = matrix * signs;
+        largest = std::max(largest, (together - sum).norm() / (sum - signs).norm());
+    }
+    return largest;
+}
 }  // namespace
 
 double StateScales::of(const std::string& unit) const
@@ -189,81 +301,18 @@ std::size_t unknowns_of(Solver& solver, const State& state)
 
 OneStepMap one_step_map(Solver& solver, const State& about, const Lattice& lattice, const StepSettings& settings)
 {
-    const StateScales scales = state_scales(solver.bodies(), lattice.cell_size);
-    const State base = with_all_marked(about, solver.bodies());
-    const Places places(solver, base);
-    const auto count = static_cast<Eigen::Index>(places.count());
-    const auto at = places.find(base);
+    StepsAbout steps(solver, about, lattice, settings);
     OneStepMap map;
-    for (std::size_t n = 0; n < places.count(); ++n)
-        map.unknowns.push_back(places.unknown(n, base, scales, lattice));
-
-    const auto after = [&](const State& start)
+    map.unknowns = steps.unknowns();
+    map.matrix.resize(steps.count(), steps.count());
+    for (Eigen::Index n = 0; n < steps.count(); ++n)
     {
-        restore(solver, start);
-        solver.assume_last_step(settings.dt);
-        for (int k = 0; k < settings.steps; ++k)
-        {
-            solver.prepare(settings.t + k * settings.dt, settings.dt);
-            solver.advance(settings.dt);
-        }
-        return state_of(solver);
-    };
-    const State end = after(base);
-    const NodeIndex shift = settings.steps > 1 ? places.motion(base, end, scales.length) : NodeIndex{0, 0};
-    const auto unknowns = [&](const State& state)
-    {
-        const auto found = places.find(state, shift);
-        Eigen::VectorXd values(count);
-        for (Eigen::Index n = 0; n < count; ++n)
-        {
-            const auto& place = found[static_cast<std::size_t>(n)];
-            values[n] = place ? state.numbers[*place] / map.unknowns[static_cast<std::size_t>(n)].scale : 0;
-        }
-        return values;
-    };
-
-    const Eigen::VectorXd middle = unknowns(end);
-    map.matrix.resize(count, count);
-    State changed = base;
-    for (Eigen::Index n = 0; n < count; ++n)
-    {
-        double& number = changed.numbers[*at[static_cast<std::size_t>(n)]];
-        const double value = number, scale = map.unknowns[static_cast<std::size_t>(n)].scale;
-        bool has_kink = false;
-        const auto slope = [&](double difference)
-        {
-            const double high = value + difference * scale, low = value - difference * scale;
-            number = high;
-            const Eigen::VectorXd up = unknowns(after(changed));
-            number = low;
-            const Eigen::VectorXd down = unknowns(after(changed));
-            number = value;
-            has_kink |= (up - 2 * middle + down).norm() > kink * difference;
-            return Eigen::VectorXd((up - down) * (scale / (high - low)));
-        };
         // upwind terms are of the form v |v|: the error is of first order, and the two differences are extrapolated to none
-        const Eigen::VectorXd coarse = slope(settings.difference);
-        map.matrix.col(n) = 2 * slope(settings.difference / 2) - coarse;
-        map.kinks += has_kink;
+        const Slope coarse = steps.slope(n, settings.difference), fine = steps.slope(n, settings.difference / 2);
+        map.matrix.col(n) = 2 * fine.value - coarse.value;
+        map.kinks += coarse.has_kink || fine.has_kink;
     }
-    std::mt19937 random(1);
-    for (int k = 0; k < 4; ++k)
-    {
-        Eigen::VectorXd signs(count);
-        for (double& sign : signs)
-            sign = random() % 2 == 0 ? 1 : -1;
-        const auto towards = [&](double difference)
-        {
-            State all = base;
-            for (Eigen::Index n = 0; n < count; ++n)
-                all.numbers[*at[static_cast<std::size_t>(n)]] += difference * signs[n] * map.unknowns[static_cast<std::size_t>(n)].scale;
-            return unknowns(after(all));
-        };
-        const Eigen::VectorXd together = (towards(settings.difference) - towards(-settings.difference)) / (2 * settings.difference);
-        const Eigen::VectorXd sum = map.matrix * signs;
-        map.excess = std::max(map.excess, (together - sum).norm() / (sum - signs).norm());
-    }
+    map.excess = excess(steps, map.matrix, settings.difference);
     return map;
 }
 }  // namespace testbed

@@ -75,7 +75,7 @@ inline std::string suggestion(const std::string& word, const std::vector<std::st
 
 /// Checks what one key cannot tell: ranges, names, geometry. Warnings need a scene that is right. Defined in check.cpp.
 void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& problems);
-/// The part that concerns materials. @param key (k) -> what the file calls material number k
+/// The part that concerns materials, in check_materials.cpp. @param key (k) -> what the file calls material number k
 void check_materials(const Scene& scene, Problems& problems, const std::function<std::string(std::size_t)>& key);
 /// What no computer holds, or no double can: the number of points and steps, and what follows from the numbers of a scene that is right in
 /// every single one. Defined in bounds.cpp.

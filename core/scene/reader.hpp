@@ -1,11 +1,9 @@
 #pragma once
 /// The reading archive of the scene's describe() functions.
 
-#include "core/scene/geometry.hpp"
-#include "core/scene/problems.hpp"
+#include "core/scene/value_reader.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 namespace testbed
@@ -14,16 +12,6 @@ namespace testbed
 std::string read_text(const std::string& path);
 /// @param path what messages call the text @throws SceneError with the place where it is not TOML
 toml::table parse_toml(const std::string& text, const std::string& path);
-
-inline std::string kind_of(const toml::node& node)
-{
-    static const std::map<toml::node_type, const char*> names{
-        {toml::node_type::table, "table"},           {toml::node_type::array, "list"},
-        {toml::node_type::string, "string"},         {toml::node_type::integer, "integer"},
-        {toml::node_type::floating_point, "number"}, {toml::node_type::boolean, "boolean"}};
-    const auto found = names.find(node.type());
-    return found == names.end() ? "date or time" : found->second;
-}
 
 inline bool is_identifier(std::string_view name)
 {
@@ -40,7 +28,8 @@ public:
         : table_(table),
           path_(std::move(path)),
           problems_(problems),
-          constants_(constants)
+          constants_(constants),
+          values_(problems, constants)
     {
     }
     Reader(const Reader&) = delete;
@@ -61,7 +50,7 @@ public:
     void optional(const char* key, T& value, const char*, const char*)
     {
         if (const toml::node* node = find(key))
-            read(full(key), *node, value);
+            values_.read(full(key), *node, value);
     }
     /// A number, or one word that stands for something else.
     void number_or(const char* key, std::optional<double>& value, const char* word, bool& is_word, const char* unit, const char* doc)
@@ -104,7 +93,7 @@ public:
     void expression(const char* key, T& value, const char* variables, const char*, const char* doc)
     {
         if (const toml::node* node = find(key))
-            read_expressions(full(key), *node, value, variables);
+            values_.read_expressions(full(key), *node, value, variables);
         else
             problems_.add(full(key), fmt::format("missing ({})", doc));
     }
@@ -112,7 +101,7 @@ public:
     void expression(const char* key, std::optional<T>& value, const char* variables, const char*, const char*)
     {
         if (const toml::node* node = find(key))
-            read_expressions(full(key), *node, value.emplace(), variables);
+            values_.read_expressions(full(key), *node, value.emplace(), variables);
     }
     void named_numbers(const char* key, Constants& values, const char*)
     {
@@ -142,7 +131,7 @@ public:
             {
                 double number = 0;
                 std::string why;
-                if (!number_of(*it->second, number, why))
+                if (!values_.number_of(*it->second, number, why))
                 {
                     ++it;
                     continue;
@@ -158,7 +147,7 @@ public:
         {
             double number = 0;
             std::string why;
-            number_of(*value, number, why);
+            values_.number_of(*value, number, why);
             problems_.remember(full(key) + "." + name, *value);
             problems_.add(full(key) + "." + name, why);
         }
@@ -255,147 +244,11 @@ private:
         value.describe(reader);
     }
 
-    bool number_of(const toml::node& node, double& value, std::string& why) const
-    {
-        if (const auto number = node.value_exact<double>())
-            value = *number;
-        else if (const auto integer = node.value_exact<std::int64_t>())
-            value = static_cast<double>(*integer);
-        else if (const auto text = node.value_exact<std::string>())
-            try
-            {
-                value = evaluate_constant(*text, constants_);
-            }
-            catch (const ExpressionError& e)
-            {
-                why = e.what();
-                return false;
-            }
-        else
-        {
-            why = "a number, or an expression of constants in quotes, is asked, not a " + kind_of(node);
-            return false;
-        }
-        if (std::isfinite(value))
-            return true;
-        why = "a finite number is asked";
-        return false;
-    }
-    void read(const std::string& path, const toml::node& node, double& value)
-    {
-        std::string why;
-        if (!number_of(node, value, why))
-            problems_.add(path, why);
-    }
-    void read(const std::string& path, const toml::node& node, bool& value)
-    {
-        if (const auto boolean = node.value_exact<bool>())
-            value = *boolean;
-        else
-            problems_.add(path, "true or false is asked, not a " + kind_of(node));
-    }
-    void read(const std::string& path, const toml::node& node, int& value)
-    {
-        double number = 0;
-        std::string why;
-        if (!number_of(node, number, why))
-            problems_.add(path, why);
-        else if (number != std::floor(number) || std::abs(number) > 1e9)
-            problems_.add(path, fmt::format("a whole number is asked, not {}", number));
-        else
-            value = static_cast<int>(number);
-    }
-    void read(const std::string& path, const toml::node& node, std::string& value)
-    {
-        if (const auto text = node.value_exact<std::string>())
-            value = *text;
-        else
-            problems_.add(path, "a string is asked, not a " + kind_of(node));
-    }
-    template <class T>
-    void read(const std::string& path, const toml::node& node, std::optional<T>& value)
-    {
-        read(path, node, value.emplace());
-    }
-    const toml::array* array_of(const std::string& path, const toml::node& node, std::size_t size)
-    {
-        const toml::array* array = node.as_array();
-        if (array && (size == 0 || array->size() == size))
-            return array;
-        problems_.add(path, size == 0 ? "a list is asked, not a " + kind_of(node) : fmt::format("a list of {} is asked", size));
-        return nullptr;
-    }
-    void read(const std::string& path, const toml::node& node, Vec2& value)
-    {
-        if (const toml::array* array = array_of(path, node, 2))
-            for (std::size_t k = 0; k < 2; ++k)
-                read(path, (*array)[k], value[k]);
-    }
-    template <class T>
-    void read(const std::string& path, const toml::node& node, std::vector<T>& values)
-    {
-        if (const toml::array* array = array_of(path, node, 0))
-        {
-            values.clear();
-            for (const toml::node& element : *array)
-                read(path, element, values.emplace_back());
-        }
-    }
-    void read_expressions(const std::string& path, const toml::node& node, std::string& value, const char* variables)
-    {
-        read_expression(path, node, value, variables);
-        evaluate_if_constant(value);
-    }
-    template <std::size_t N>
-    void read_expressions(const std::string& path, const toml::node& node, std::array<std::string, N>& values, const char* variables)
-    {
-        if (const toml::array* array = array_of(path, node, N))
-            for (std::size_t k = 0; k < N; ++k)
-                read_expression(path, (*array)[k], values[k], variables);
-    }
-    void read_expression(const std::string& path, const toml::node& node, std::string& value, const char* variables)
-    {
-        if (const auto text = node.value_exact<std::string>())
-            value = *text;
-        else if (node.is_number())
-        {
-            double number = 0;
-            read(path, node, number);
-            value = fmt::format("{}", number);
-            return;
-        }
-        else
-            return problems_.add(path, "a number or an expression in quotes is asked, not a " + kind_of(node));
-        try
-        {
-            const Expression check(value, constants_);
-            refuse_other_variables(value, constants_, variables);
-        }
-        catch (const ExpressionError& e)
-        {
-            problems_.add(path, e.what());
-        }
-    }
-
-    /// An expression of constants alone is a number: what it stands for then needs no field.
-    void evaluate_if_constant(std::string& value) const
-    {
-        if (is_number(value))
-            return;
-        try
-        {
-            if (const double number = evaluate_constant(value, constants_); std::isfinite(number))
-                value = fmt::format("{}", number);
-        }
-        catch (const ExpressionError&)  // it depends on the place, or was told before
-        {
-        }
-    }
-
     const toml::table& table_;
     std::string path_;
     Problems& problems_;
     Constants& constants_;
+    ValueReader values_;
     std::vector<std::string> known_;
 };
 }  // namespace testbed
