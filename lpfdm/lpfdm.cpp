@@ -3,6 +3,8 @@
 #include "core/run/particle_solver.hpp"
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
+#include "lpfdm/frontier.hpp"
+#include "lpfdm/initial_velocity.hpp"
 #include "lpfdm/time_step.hpp"
 
 #include <cmath>
@@ -18,7 +20,7 @@ public:
     explicit Lpfdm(const Scene& scene)
         : Base(scene, {.box = Support::has_box}),
           grid_(without_numbers(make_lattice(scene.grid))),
-          mass_before_(grid_.lattice.nodes(), 0),
+          frontier_(grid_.lattice.nodes()),
           options_(scene.lpfdm),
           increment_{scene.lpfdm.convection == LpfdmSpec::Convection::two_sided ? 0.5 : 0.0}
     {
@@ -35,7 +37,7 @@ public:
                 body.counted_volume = options_.volume_cap * q.initial_volume;
         }
         rebuild();
-        set_initial_velocity(scene);
+        set_initial_velocity<S>(grid_, scene, bodies_, sums_.all());
     }
 
     void do_prepare(const Step& step) override
@@ -56,9 +58,10 @@ public:
         timer_("convection (13)",
                [&]
                {
-                   extend_to_frontier(step, others);
+                   if (frontier_.template extend<S>(grid_, others, step, options_.frontier, faces_ ? &*faces_ : nullptr))
+                       gradients_over_ = 0;
                    convect_velocity(step.last_dt);
-                   keep_mass();
+                   frontier_.keep_mass(nodes_);
                    restrain();
                });
         if (options_.hourglass > 0)
@@ -138,8 +141,8 @@ public:
     std::size_t active_cells() const override { return grid_.gather.active().size(); }
     std::size_t bytes() const override
     {
-        const std::size_t numbers = mass_before_.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity() + cell_weight_.capacity() +
-                                    2 * cell_force_.capacity();
+        const std::size_t numbers = frontier_.mass_before.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity() +
+                                    cell_weight_.capacity() + 2 * cell_force_.capacity();
         return this->bytes_of_points_and_loads() + grid_.bytes() + sums_.bytes() + mid_steps_.bytes() + (faces_ ? faces_->bytes() : 0) +
                numbers * sizeof(double);
     }
@@ -178,7 +181,7 @@ private:
                     a.column("j", "-", at, &NodeIndex::j);
                     a.nodal("velocity_x", "m/s", lattice, at, nodes_.vx);
                     a.nodal("velocity_y", "m/s", lattice, at, nodes_.vy);
-                    a.nodal("mass_before", "kg/m", lattice, at, mass_before_);
+                    a.nodal("mass_before", "kg/m", lattice, at, frontier_.mass_before);
                 });
     }
 
@@ -188,11 +191,11 @@ private:
         if (lattice.numbered != grid_.lattice.numbered)
             renumber(lattice);
         nodes_.clear();
-        std::fill(mass_before_.begin(), mass_before_.end(), 0.0);
+        std::fill(frontier_.mass_before.begin(), frontier_.mass_before.end(), 0.0);
         std::fill(hourglass_x_.begin(), hourglass_x_.end(), 0.0);
         std::fill(hourglass_y_.begin(), hourglass_y_.end(), 0.0);
         grid_.rebuild<S>(cloud_.bins());
-        left_.clear();
+        frontier_.left.clear();
         gradients_over_ = 0;
         sums_.update(grid_.lattice, bodies_);
     }
@@ -211,7 +214,7 @@ private:
         if (options_.hourglass > 0)
             for (const auto c : grid_.gather.active())  // the nodes around a cell that goes out of use may stay
                 hourglass_x_[c] = hourglass_y_[c] = 0;
-        left_ = grid_.rebuild<S>(bins);
+        frontier_.left = grid_.rebuild<S>(bins);
         sums_.update(grid_.lattice, bodies_);
         return true;
     }
@@ -235,7 +238,8 @@ private:
     void find_weight() override
     {
         weight_->nodes.assign(nodes_.mass.size(), 0.0);
-        weight_->template collect<4>(bodies_, grid_.gather, sums_.all(), S * S, [&](std::size_t c, double mass) { cell_weight_[c] = mass; });
+        weight_->template collect<4>(bodies_, grid_.gather, sums_.all(), S * S,
+                                     [&](std::size_t c, double mass) { cell_weight_[c] = mass; });
         for (const auto c : grid_.gather.active())
             for (int k = 0; k < 4; ++k)
                 weight_->nodes[grid_.corner(grid_.first_node(c), k)] += 0.25 * cell_weight_[c];
@@ -243,7 +247,7 @@ private:
 
     void renumber(const Lattice& to)
     {
-        testbed::renumber(mass_before_, grid_.lattice, to);
+        testbed::renumber(frontier_.mass_before, grid_.lattice, to);
         grid_.renumber(to);
         if (faces_)
             faces_->resize(to.nodes());
@@ -262,87 +266,6 @@ private:
         }
     }
 
-    /// Nodes that material reaches for the first time take the mass-weighted mean velocity of their neighbours that were
-    /// active before (or start from zero, as printed); nodes that it left are cleared.
-    void extend_to_frontier(const Step& step, bool others)
-    {
-        if (!others && (S == 1 || !frontier_moved()))  // with S = 1 a cell in use has mass
-            return;
-        gradients_over_ = 0;
-        std::vector<std::pair<std::uint32_t, Vec2>> reached;
-        for (const auto n : nodes_.active())
-            if (nodes_.mass[n] > 0 && !mass_before_[n])
-                reached.emplace_back(n, !step.is_first() && options_.frontier != LpfdmSpec::Frontier::literal ? mean_of_neighbours(n)
-                                                                                                              : Vec2{0, 0});
-        for (const auto& [n, v] : reached)
-            if (!step.is_first())
-            {
-                nodes_.vx[n] = v[0];
-                nodes_.vy[n] = v[1];
-            }
-        for (const auto n : left_)
-        {
-            nodes_.mass[n] = nodes_.fx[n] = nodes_.fy[n] = 0;
-            if (faces_)
-                faces_->forget(n);
-        }
-        const auto update = [&](std::uint32_t n)
-        {
-            if (!(nodes_.mass[n] > 0))
-                mass_before_[n] = nodes_.vx[n] = nodes_.vy[n] = 0;
-        };
-        std::for_each(nodes_.active().begin(), nodes_.active().end(), update);
-        std::for_each(left_.begin(), left_.end(), update);
-        left_.clear();
-    }
-
-    /// Whether a node won or lost its mass; those without come to rest.
-    bool frontier_moved()
-    {
-        std::atomic<bool> moved{false};
-        nodes_.for_each(
-            [&](std::size_t n, const auto& lanes)
-            {
-                const Pack mass = lanes.load(&nodes_.mass[n]), was = lanes.load(&mass_before_[n]);
-                const auto has = mass > Pack(0.0);
-                if (lanes.any(has != (was > Pack(0.0))))
-                    moved.store(true, std::memory_order_relaxed);
-                if (!lanes.any(!has))
-                    return;
-                Pack vx = lanes.load(&nodes_.vx[n]), vy = lanes.load(&nodes_.vy[n]);
-                stdx::where(!has, vx) = Pack(0.0);
-                stdx::where(!has, vy) = Pack(0.0);
-                lanes.store(&nodes_.vx[n], vx);
-                lanes.store(&nodes_.vy[n], vy);
-            });
-        return moved;
-    }
-
-    void keep_mass()
-    {
-        nodes_.for_each([&](std::size_t n, const auto& lanes) { lanes.store(&mass_before_[n], lanes.load(&nodes_.mass[n])); });
-    }
-
-    Vec2 mean_of_neighbours(std::uint32_t node) const
-    {
-        double mass = 0;
-        Vec2 momentum{0, 0};
-        const int i = grid_.lattice.node_i(node), j = grid_.lattice.node_j(node);
-        for (int dj = -1; dj <= 1; ++dj)
-            for (int di = -1; di <= 1; ++di)
-            {
-                if (!grid_.lattice.has_node(i + di, j + dj))
-                    continue;
-                const std::size_t n = grid_.lattice.node(i + di, j + dj);
-                if (!mass_before_[n])
-                    continue;
-                mass += nodes_.mass[n];
-                momentum[0] += nodes_.mass[n] * nodes_.vx[n];
-                momentum[1] += nodes_.mass[n] * nodes_.vy[n];
-            }
-        return mass > 0 ? Vec2{momentum[0] / mass, momentum[1] / mass} : Vec2{0, 0};
-    }
-
     /// Eq. (13), for the step that led here; there is none at the start.
     void convect_velocity(double dt)
     {
@@ -357,7 +280,7 @@ private:
         case LpfdmSpec::Convection::central: return convect<CentralConvection>(grid_, dt);
         case LpfdmSpec::Convection::two_sided:
             faces_->find(grid_);
-            return convect(grid_, *faces_, dt, 0.5, options_.frontier == LpfdmSpec::Frontier::arrival ? &mass_before_ : nullptr);
+            return convect(grid_, *faces_, dt, 0.5, options_.frontier == LpfdmSpec::Frontier::arrival ? &frontier_.mass_before : nullptr);
         }
     }
 
@@ -374,43 +297,9 @@ private:
                 }
     }
 
-    /// Nodes start with the bodies' velocity at their own position, weighted by the mass that each body gives them.
-    void set_initial_velocity(const Scene& scene)
-    {
-        std::vector<double> mass(grid_.lattice.nodes(), 0.0);
-        std::size_t block = 0;
-        for (std::size_t b = 0; b < bodies_.size(); ++b)
-        {
-            std::optional<VectorExpression> velocity;
-            if (scene.bodies[b].velocity)
-                velocity.emplace(*scene.bodies[b].velocity, scene.expression_constants());
-            for (const Bin& bin : bodies_[b].bins.list())
-                for (int k = 0; k < S * S; ++k, ++block)
-                    for (int corner = 0; corner < 4; ++corner)
-                    {
-                        const std::size_t n = grid_.corner(grid_.lattice.node(bin.i + k % S, bin.j + k / S), corner);
-                        const Vec2 x = grid_.lattice.node_position(n);
-                        const double m = 0.25 * sums_.all()[block * 4];
-                        mass[n] += m;
-                        if (!velocity)
-                            continue;
-                        const Vec2 v = (*velocity)({x[0], x[1], x[0], x[1], 0});
-                        nodes_.vx[n] += m * v[0];
-                        nodes_.vy[n] += m * v[1];
-                    }
-        }
-        for (const auto n : nodes_.active())
-            if (mass[n] > 0)
-            {
-                nodes_.vx[n] /= mass[n];
-                nodes_.vy[n] /= mass[n];
-            }
-    }
-
     LpfdmGrid grid_;
     Nodes& nodes_ = grid_.nodes;
-    std::vector<double> mass_before_;  ///< of nodes, in the step before [kg/m]
-    std::vector<std::uint32_t> left_;  ///< nodes that went out of use
+    Frontier frontier_;
     LpfdmSpec options_;
     StrainIncrement increment_;
     MidSteps mid_steps_;                             ///< empty for points without a box

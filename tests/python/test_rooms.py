@@ -1,6 +1,6 @@
 """Where files stand: what a room includes lies in its own or in a room below it, and no header is there for the tests alone."""
+import ast
 import re
-import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,3 +54,40 @@ def test_imports_of_the_report_package_run_downward():
             if REPORTS.index(other) >= REPORTS.index(room):
                 upward.append(f"{path.relative_to(package)}: {other}")
     assert seen >= {"read", "grade", "draw"} and not upward, "\n".join(upward)
+
+
+def sources():
+    for top in ("core", *METHODS, "benchmarks", "reports"):
+        yield from (path for path in (ROOT / top).rglob("*") if path.suffix in (".cpp", ".hpp", ".py"))
+
+
+def test_a_file_is_about_one_idea():
+    long = {path.relative_to(ROOT).as_posix(): count for path in sources() if (count := len(path.read_text().splitlines())) > 350}
+    assert not long
+
+
+def test_a_function_fits_a_screen():
+    long = []
+    for path in sources():
+        if path.suffix == ".py":
+            functions = (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef))
+            sizes = [(node.name, node.end_lineno - node.lineno + 1) for node in functions]
+        else:
+            sizes = list(cpp_functions(path.read_text().splitlines()))
+        long += [(path.relative_to(ROOT).as_posix(), *size) for size in sizes if size[1] > 60]
+    assert not long
+
+
+def cpp_functions(lines):
+    """(first line, number of lines) of what stands between braces at one depth and is no type, namespace, loop or lambda."""
+    open_at = []
+    for number, line in enumerate(lines):
+        if found := re.fullmatch(r"( *)\{", line):
+            begin = number - 1
+            while begin > 0 and not re.search(r"[;{}:]\s*$|^\s*$|^\s*//", lines[begin - 1]):
+                begin -= 1
+            open_at.append((len(found[1]), begin, " ".join(text.strip() for text in lines[begin:number])))
+        elif (found := re.match(r"( *)\}", line)) and open_at and open_at[-1][0] == len(found[1]):
+            _, begin, head = open_at.pop()
+            if "(" in head and not re.search(r"^(if|for|while|switch|else|try|catch|do|namespace)\b|\b(struct|class|enum) |\[[^]]*\]\s*\(", head):
+                yield head, number - begin + 1

@@ -1,0 +1,106 @@
+#pragma once
+/// The frontier of the material: nodes that it reaches or leaves from one step to the next.
+
+#include "lpfdm/free_faces.hpp"
+
+#include <atomic>
+
+namespace testbed
+{
+struct Frontier
+{
+    std::vector<double> mass_before;  ///< of nodes, in the step before [kg/m]
+    std::vector<std::uint32_t> left;  ///< nodes that went out of use
+
+    explicit Frontier(std::size_t nodes) : mass_before(nodes, 0.0) {}
+
+    /// Nodes that material reaches for the first time take the mass-weighted mean velocity of their neighbours that were active before,
+    /// or start from zero, as printed; at the start of a run they have one. Nodes that it left are cleared. Returns whether any changed.
+    /// @param others whether other cells are in use than in the step before @param faces null if the convection has none
+    template <int S>
+    bool extend(LpfdmGrid& grid, bool others, const Step& step, LpfdmSpec::Frontier kind, FreeFaces* faces)
+    {
+        Nodes& nodes = grid.nodes;
+        if (!others && (S == 1 || !has_moved(nodes)))  // with S = 1 a cell in use has mass
+            return false;
+        if (!step.is_first())
+            reach(grid, kind);
+        for (const auto n : left)
+        {
+            nodes.mass[n] = nodes.fx[n] = nodes.fy[n] = 0;
+            if (faces)
+                faces->forget(n);
+        }
+        const auto rest = [&](std::uint32_t n)
+        {
+            if (!(nodes.mass[n] > 0))
+                mass_before[n] = nodes.vx[n] = nodes.vy[n] = 0;
+        };
+        std::for_each(nodes.active().begin(), nodes.active().end(), rest);
+        std::for_each(left.begin(), left.end(), rest);
+        left.clear();
+        return true;
+    }
+
+    void keep_mass(const Nodes& nodes)
+    {
+        nodes.for_each([&](std::size_t n, const auto& lanes) { lanes.store(&mass_before[n], lanes.load(&nodes.mass[n])); });
+    }
+
+private:
+    void reach(LpfdmGrid& grid, LpfdmSpec::Frontier kind) const
+    {
+        std::vector<std::pair<std::uint32_t, Vec2>> reached;  // all means are of what was active before
+        for (const auto n : grid.nodes.active())
+            if (grid.nodes.mass[n] > 0 && !mass_before[n])
+                reached.emplace_back(n, kind != LpfdmSpec::Frontier::literal ? mean_of_neighbours(grid, n) : Vec2{0, 0});
+        for (const auto& [n, v] : reached)
+        {
+            grid.nodes.vx[n] = v[0];
+            grid.nodes.vy[n] = v[1];
+        }
+    }
+
+    /// Whether a node won or lost its mass; those without come to rest.
+    bool has_moved(Nodes& nodes) const
+    {
+        std::atomic<bool> moved{false};
+        nodes.for_each(
+            [&](std::size_t n, const auto& lanes)
+            {
+                const Pack mass = lanes.load(&nodes.mass[n]), was = lanes.load(&mass_before[n]);
+                const auto has = mass > Pack(0.0);
+                if (lanes.any(has != (was > Pack(0.0))))
+                    moved.store(true, std::memory_order_relaxed);
+                if (!lanes.any(!has))
+                    return;
+                Pack vx = lanes.load(&nodes.vx[n]), vy = lanes.load(&nodes.vy[n]);
+                stdx::where(!has, vx) = Pack(0.0);
+                stdx::where(!has, vy) = Pack(0.0);
+                lanes.store(&nodes.vx[n], vx);
+                lanes.store(&nodes.vy[n], vy);
+            });
+        return moved;
+    }
+
+    Vec2 mean_of_neighbours(const LpfdmGrid& grid, std::uint32_t node) const
+    {
+        double mass = 0;
+        Vec2 momentum{0, 0};
+        const int i = grid.lattice.node_i(node), j = grid.lattice.node_j(node);
+        for (int dj = -1; dj <= 1; ++dj)
+            for (int di = -1; di <= 1; ++di)
+            {
+                if (!grid.lattice.has_node(i + di, j + dj))
+                    continue;
+                const std::size_t n = grid.lattice.node(i + di, j + dj);
+                if (!mass_before[n])
+                    continue;
+                mass += grid.nodes.mass[n];
+                momentum[0] += grid.nodes.mass[n] * grid.nodes.vx[n];
+                momentum[1] += grid.nodes.mass[n] * grid.nodes.vy[n];
+            }
+        return mass > 0 ? Vec2{momentum[0] / mass, momentum[1] / mass} : Vec2{0, 0};
+    }
+};
+}  // namespace testbed
