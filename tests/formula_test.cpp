@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <functional>
 #include <gtest/gtest.h>
+#include <limits>
 
 using namespace testbed;
 using test::Random;
@@ -123,6 +124,34 @@ TEST(Formula, AgreesOnRandomExpressions)
             }
         }
     }
+}
+
+/// Where vector functions and comparisons would go their own ways.
+TEST(Formula, AgreesAtTheEdges)
+{
+    const std::vector<double> x{0.0, -0.0, 1.0, -1.0, 0.5, 1e-310, -1e-310, 1e308, std::numeric_limits<double>::infinity(), 2.0};
+    for (const char* text :
+         {"x^0", "0^x", "abs(x)^0.5", "(x-x)^(x-x)", "1/(1 + x^0)", "ln(abs(x)+1e-310)", "log10(1e-310+abs(x))", "log2(abs(x)+1e-310)",
+          "ln(x) ? 1 : 2", "ln(-1-x*x) != ln(-1-x*x)", "ln(x) && 1", "ln(x) || 0", "x^3", "x^2.5 > 0"})
+    {
+        const Formula formula(std::vector<std::string>{text}, {});
+        const Expression one(text, {});
+        EXPECT_TRUE(formula.is_compiled()) << text;
+        for (const double v : x)
+        {
+            const double exact = one({v, v, v, v, 0});
+            double value = 0;
+            double* const result = &value;
+            if (!std::isfinite(exact))
+                EXPECT_THROW(formula.evaluate({&v, &v, &v, &v, 0}, 1, {&result, 1}), ExpressionError) << text << " at " << v;
+            else
+            {
+                ASSERT_NO_THROW(formula.evaluate({&v, &v, &v, &v, 0}, 1, {&result, 1})) << text << " at " << v;
+                EXPECT_NEAR(value, exact, 1e-14 * (1 + std::abs(exact))) << text << " at " << v;
+            }
+        }
+    }
+    EXPECT_FALSE(Formula(std::vector<std::string>{"0.5 && 0.5 ? x : 1"}, {}).is_compiled());
 }
 
 TEST(Formula, SharesWhatIsTheSame)

@@ -2,6 +2,7 @@
 
 #include "core/run/hdf5.hpp"
 
+#include <charconv>
 #include <fcntl.h>
 #include <sstream>
 
@@ -37,7 +38,10 @@ State with_parts(const std::string& text, std::vector<double> numbers, const std
         const auto first = line.find('\t'), second = line.find('\t', first + 1);
         if (first == std::string::npos || second == std::string::npos)
             refuse(path, "its list of parts cannot be read");
-        const std::size_t count = std::stoull(line.substr(second + 1));
+        std::size_t count = 0;
+        if (std::from_chars(line.data() + second + 1, line.data() + line.size(), count).ec != std::errc{} ||
+            count > state.numbers.size() - begin)
+            refuse(path, "its list of parts cannot be read");
         state.parts.push_back({line.substr(0, first), line.substr(first + 1, second - first - 1), begin, count});
         begin += count;
     }
@@ -69,7 +73,10 @@ void check_sum(const std::filesystem::path& path)
 
 std::string text_attribute(hid_t file, const char* group, const char* name)
 {
-    const Handle attribute(H5Aopen_by_name(file, group, name, H5P_DEFAULT, H5P_DEFAULT), H5Aclose), type(H5Aget_type(attribute), H5Tclose);
+    const Handle attribute(H5Aopen_by_name(file, group, name, H5P_DEFAULT, H5P_DEFAULT), H5Aclose), type(H5Aget_type(attribute), H5Tclose),
+        space(H5Aget_space(attribute), H5Sclose);
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) <= 0 || H5Sget_simple_extent_npoints(space) != 1)
+        throw OutputError("no text");
     char* text = nullptr;
     check(H5Aread(attribute, type, &text));
     const std::string copy = text ? text : "";
@@ -113,8 +120,11 @@ Restart read_restart(const std::filesystem::path& path)
         const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
         if (const std::string is = text_attribute(file, "/", "format"); is != format)
             refuse(path, fmt::format("is a {} file, not one of format {}", is, format));
+        const Handle attribute(H5Aopen_by_name(file, "/", "format_version", H5P_DEFAULT, H5P_DEFAULT), H5Aclose),
+            space(H5Aget_space(attribute), H5Sclose);
         std::int64_t has = 0;
-        const Handle attribute(H5Aopen_by_name(file, "/", "format_version", H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+        if (H5Sget_simple_extent_npoints(space) != 1)
+            throw OutputError("no number");
         check(H5Aread(attribute, H5T_NATIVE_INT64, &has));
         if (has != version)
             refuse(path, fmt::format("has version {}, this program reads {}", has, version));

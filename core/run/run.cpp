@@ -142,6 +142,8 @@ Outcome run_once(const RunOptions& options, const MakeSolver& make_solver)
                                 : load_and_warn(options);
     const std::string output = options.output.empty() ? default_output(scene) : options.output;
     check_output(output);
+    if (std::error_code ignored; restart && std::filesystem::equivalent(output, restart->path, ignored))
+        throw SceneError(fmt::format("output '{}' is the restart file itself: name another one", output));
     const std::unique_ptr<Solver> solver = make_solver(scene);
     if (const std::string warning = step_warning(scene, *solver); !warning.empty())
         warn(options, warning);

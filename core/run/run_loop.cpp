@@ -89,6 +89,9 @@ void RunLoop::state(Archive& a)
     a.group("observer", [&] { observer_.state(a); });
     guards_.state(a);
     a.value("steps", "-", out_.steps);
+    double history_interval = history_interval_, snapshot_interval = snapshot_interval_;
+    a.value("history_interval", "s", history_interval);
+    a.value("snapshot_interval", "s", snapshot_interval);
     a.value("next_sample", "s", next_sample_);
     a.value("next_snapshot", "s", next_snapshot_);
     a.value("looked_at", "-", looked_at_);
@@ -99,6 +102,10 @@ void RunLoop::state(Archive& a)
     a.value("guard_seconds", "s", out_.guard_seconds);
     if constexpr (Archive::reads)
     {
+        if (history_interval != history_interval_)
+            next_sample_ = std::ceil(clock_.t() / history_interval_) * history_interval_;
+        if (snapshot_interval != snapshot_interval_)
+            next_snapshot_ = std::ceil(clock_.t() / snapshot_interval_) * snapshot_interval_;
         solve_seconds_before_ = solved;
         forcing_seconds_before_ = forced;
     }

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <xsimd/xsimd.hpp>
 
 namespace testbed
@@ -25,6 +27,49 @@ Batch choose(const xsimd::batch_bool<double>& which, const Batch& yes, const Bat
     return xsimd::select(which, yes, no);
 }
 
+/// Whether it counts as true: not a number does.
+bool is_true(double a)
+{
+    return !(a == 0.0);
+}
+xsimd::batch_bool<double> is_true(const Batch& a)
+{
+    return !(a == Batch(0.0));
+}
+
+/// Vector functions are right for ordinary arguments; where a batch holds others, each is left to the scalar one.
+template <class Vector, class Scalar>
+Batch ordinary_or(const Batch& a, const Batch& b, Vector&& vector, Scalar&& scalar)
+{
+    if (xsimd::all(a >= Batch(std::numeric_limits<double>::min())) && xsimd::all(a <= Batch(std::numeric_limits<double>::max())) &&
+        xsimd::all(xsimd::abs(b) <= Batch(std::numeric_limits<double>::max())))
+        return vector(a, b);
+    std::array<double, Batch::size> x, y;
+    a.store_unaligned(x.data());
+    b.store_unaligned(y.data());
+    for (std::size_t k = 0; k < x.size(); ++k)
+        x[k] = scalar(x[k], y[k]);
+    return Batch::load_unaligned(x.data());
+}
+double power(double a, double b)
+{
+    return std::pow(a, b);
+}
+Batch power(const Batch& a, const Batch& b)
+{
+    return ordinary_or(
+        a, b, [](const Batch& x, const Batch& y) { return xsimd::pow(x, y); }, [](double x, double y) { return std::pow(x, y); });
+}
+double logarithm(double a)
+{
+    return std::log(a);
+}
+Batch logarithm(const Batch& a)
+{
+    return ordinary_or(
+        a, Batch(0.0), [](const Batch& x, const Batch&) { return xsimd::log(x); }, [](double x, double) { return std::log(x); });
+}
+
 /// One operation, for doubles and for batches of them, whose functions are found beside their type.
 template <class Op, class T>
 TESTBED_INLINE inline T value_of(Op op, const T& a, const T& b, const T& c)
@@ -39,17 +84,17 @@ TESTBED_INLINE inline T value_of(Op op, const T& a, const T& b, const T& c)
     case Op::subtract: return a - b;
     case Op::multiply: return a * b;
     case Op::divide: return a / b;
-    case Op::power: return pow(a, b);
+    case Op::power: return power(a, b);
     case Op::negate: return -a;
     case Op::less: return choose(a < b, one, zero);
     case Op::less_equal: return choose(a <= b, one, zero);
     case Op::greater: return choose(a > b, one, zero);
     case Op::greater_equal: return choose(a >= b, one, zero);
     case Op::equal: return choose(a == b, one, zero);
-    case Op::not_equal: return choose(a != b, one, zero);
-    case Op::both: return choose(a != zero, choose(b != zero, one, zero), zero);
-    case Op::either: return choose(a != zero, one, choose(b != zero, one, zero));
-    case Op::select: return choose(a != zero, b, c);
+    case Op::not_equal: return choose(a == b, zero, one);
+    case Op::both: return choose(is_true(a), choose(is_true(b), one, zero), zero);
+    case Op::either: return choose(is_true(a), one, choose(is_true(b), one, zero));
+    case Op::select: return choose(is_true(a), b, c);
     case Op::sin: return sin(a);
     case Op::cos: return cos(a);
     case Op::tan: return tan(a);
@@ -60,9 +105,9 @@ TESTBED_INLINE inline T value_of(Op op, const T& a, const T& b, const T& c)
     case Op::cosh: return cosh(a);
     case Op::tanh: return tanh(a);
     case Op::exp: return exp(a);
-    case Op::log: return log(a);
-    case Op::log2: return log2(a);
-    case Op::log10: return log10(a);
+    case Op::log: return logarithm(a);
+    case Op::log2: return logarithm(a) * T(std::numbers::log2e);
+    case Op::log10: return logarithm(a) * T(std::numbers::log10e);
     case Op::sqrt: return sqrt(a);
     case Op::abs: return abs(a);
     case Op::minimum: return choose(b < a, b, a);

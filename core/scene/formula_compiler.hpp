@@ -63,6 +63,8 @@ private:
             is_constant &= program[f].op == Op::constant;
             varies |= program[f].varies;
         }
+        if (is_constant && (op == Op::both || op == Op::either))
+            throw NotKnown{};  // muParser takes whole numbers for these
         if (is_constant)
             return constant(Formula::apply(op, program[from[0]].value, program[from[1]].value, program[from[2]].value));
         return add({op, from, 0, varies});

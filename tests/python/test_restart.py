@@ -104,7 +104,7 @@ def test_same_bits_after_a_restart(tmp_path, method, case, settings):
 @pytest.mark.parametrize("method", ["lpfdm", "mpm-cpgimp"])
 def test_nothing_is_lost_but_the_time_since_the_last_checkpoint(tmp_path, method):
     """Killed at twenty random moments, and each time taken up again."""
-    scene, settings = CASES / "soil/psc/scene.toml", sets(["time.end=0.25"])
+    scene, settings = CASES / "soil/psc/scene.toml", sets(["time.end=0.5"])
     whole, killed = tmp_path / "whole.h5", tmp_path / "killed.h5"
     run_testbed("run", scene, "--method", method, *settings, "-o", whole, "--quiet")
     with h5py.File(whole) as file:
@@ -113,8 +113,11 @@ def test_nothing_is_lost_but_the_time_since_the_last_checkpoint(tmp_path, method
     every = ["--set", f"output.checkpoint={seconds / 200}"]
     while kills < 20:
         source = ["--restart", restart] if restart.exists() else [scene, "--method", method, *settings]
+        written = restart.stat().st_mtime_ns if restart.exists() else 0
         process = subprocess.Popen([str(a) for a in (TESTBED, "run", *source, *every, "-o", killed, "--quiet")], stderr=subprocess.PIPE)
-        time.sleep(moments.uniform(0.02, 0.1) + seconds * moments.uniform(0.01, 0.08))
+        while process.poll() is None and (restart.stat().st_mtime_ns if restart.exists() else 0) == written:
+            time.sleep(0.002)
+        time.sleep(seconds * moments.uniform(0, 0.04))
         if process.poll() is not None:
             assert process.returncode == 0, process.stderr.read()
             break  # through before its time
@@ -179,6 +182,18 @@ def test_the_scene_may_be_named_and_its_output_changed(tmp_path, stopped):
             "-o", tmp_path / "x.h5", "--quiet")
     assert "before the time of the restart" in run_testbed(  # of another one
         "run", "--restart", _late(tmp_path), "--set", "time.end=1e-3", "-o", tmp_path / "y.h5", code=1)
+
+
+def test_another_output_holds_from_the_restart_on(tmp_path, stopped):
+    testbed_output = sets(["output.snapshots=16", "output.history=0.25", "time.wall_clock_limit=99"])
+    run_testbed("run", "--restart", stopped, *testbed_output, "-o", tmp_path / "x.h5", "--quiet")
+    with h5py.File(tmp_path / "x.h5") as file:
+        for times in ([node.attrs["time"] for node in file["snapshots"].values()], file["history/time"][()]):
+            assert len(times) > 5 and np.diff(times)[:-1] == pytest.approx(0.25, abs=0.01)  # the run comes to rest before its end
+    copy = tmp_path / "y.restart.h5"
+    copy.write_bytes(stopped.read_bytes())
+    assert "the restart file itself" in run_testbed("run", "--restart", copy, "-o", copy, code=1)
+    assert copy.read_bytes() == stopped.read_bytes()
 
 
 def _late(tmp_path):
