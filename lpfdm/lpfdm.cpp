@@ -105,7 +105,7 @@ public:
         node_ops_.end_step(dt);
     }
 
-    MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, this->lag(), internal_); }
+    MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, this->lag(), this->internal_); }
 
     PointMotion point_motion() const override
     {
@@ -158,17 +158,12 @@ public:
 
 private:
     using Base = ParticleSolver<Support>;
-    using Base::bodies_, Base::body_force_, Base::cloud_, Base::damping_, Base::internal_, Base::node_ops_, Base::S, Base::timer_,
-        Base::weight_;
+    using Base::bodies_, Base::body_force_, Base::cloud_, Base::damping_, Base::node_ops_, Base::S, Base::timer_, Base::weight_;
 
     template <class Archive>
     void state(Archive& a)
     {
-        cloud_.state(a);
-        node_ops_.state(a);
-        a.value("last_dt", "s", this->last_dt_);
-        Lattice lattice = grid_.lattice;
-        lattice.state(a);
+        const Lattice lattice = this->state_of_points(a, grid_.lattice);
         if constexpr (Archive::reads)
             rebuild_as_read(lattice);
         std::vector<NodeIndex> at;

@@ -94,7 +94,7 @@ public:
     /// that of the nodes.
     MotionSums sums() const override
     {
-        MotionSums s = nodal_sums(grid_.lattice, nodes_, this->lag(), internal_);
+        MotionSums s = nodal_sums(grid_.lattice, nodes_, this->lag(), this->internal_);
         s.kinetic_energy += point_motion().kinetic_energy - s.kinetic_before;
         return s;
     }
@@ -138,17 +138,12 @@ public:
 
 private:
     using Base = ParticleSolver<Shape>;
-    using Base::bodies_, Base::body_force_, Base::cloud_, Base::damping_, Base::node_ops_, Base::S, Base::timer_, Base::weight_,
-        Base::internal_;
+    using Base::bodies_, Base::body_force_, Base::cloud_, Base::damping_, Base::node_ops_, Base::S, Base::timer_, Base::weight_;
 
     template <class Archive>
     void state(Archive& a)
     {
-        cloud_.state(a);
-        node_ops_.state(a);
-        a.value("last_dt", "s", this->last_dt_);
-        Lattice lattice = grid_.lattice;
-        lattice.state(a);
+        const Lattice lattice = this->state_of_points(a, grid_.lattice);
         if constexpr (Archive::reads)
             rebuild_as_read(lattice);
     }

@@ -60,6 +60,16 @@ protected:
                    node_ops_.apply_forces(lattice, nodes, t);
                });
     }
+    /// What a step depends on beside the unknowns of nodes. Returns the lattice with the numbers that it has in the state.
+    template <class Archive>
+    Lattice state_of_points(Archive& a, Lattice lattice)
+    {
+        cloud_.state(a);
+        node_ops_.state(a);
+        a.value("last_dt", "s", this->last_dt_);
+        lattice.state(a);
+        return lattice;
+    }
     std::size_t bytes_of_points_and_loads() const
     {
         return cloud_.bytes() + (body_force_ ? body_force_->bytes() : 0) + (weight_ ? weight_->bytes() : 0);
