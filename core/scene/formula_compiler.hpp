@@ -153,7 +153,7 @@ private:
         std::uint32_t exponent = power();
         if (negative)
             exponent = make(Op::negate, exponent);
-        const Instruction& e = formula_.program_[exponent];
+        const Instruction e = formula_.program_[exponent];  // a copy: make() moves the program
         if (e.op == Op::constant && (e.value == 2 || e.value == 3 || e.value == 4) && formula_.program_[base].op != Op::constant)
         {
             const std::uint32_t square = make(Op::multiply, base, base);
