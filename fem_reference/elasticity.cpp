@@ -29,7 +29,7 @@ double contract(const SymTensor<>& stress, const Gradient<>& d)
 
 Elasticity::Elasticity(const Scene& scene, const Lattice& lattice, const Warn& warn)
     : scene_(scene),
-      element_(dealii::FE_Q<2>(static_cast<unsigned int>(scene.fem.degree)), 2)
+      element_(dealii::FE_Q<2>(static_cast<unsigned int>(scene.options<FemSpec>().degree)), 2)
 {
     make_mesh(scene, lattice, warn, mesh_);
     dofs_.reinit(mesh_);

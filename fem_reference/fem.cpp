@@ -75,7 +75,7 @@ void FemSolver::update_points()
 
 double FemSolver::critical_time_step(const Scene& scene)
 {
-    return testbed::critical_time_step(scene) / (scene.fem.degree * cells_per_lattice_cell(scene));
+    return testbed::critical_time_step(scene) / (scene.options<FemSpec>().degree * cells_per_lattice_cell(scene));
 }
 
 std::size_t FemSolver::bytes() const
@@ -293,8 +293,8 @@ std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
     const bool ramped = scene.gravity && scene.gravity->ramp > 0;
     const bool moving = std::any_of(scene.walls.begin(), scene.walls.end(), [](const WallSpec& wall) { return wall.velocity.has_value(); });
     using Analysis = FemSpec::Analysis;
-    if (scene.fem.analysis == Analysis::statics ||
-        (scene.fem.analysis == Analysis::by_scene && (damped || ramped || moving || scene.time.stop_unbalanced)))
+    if (scene.options<FemSpec>().analysis == Analysis::statics ||
+        (scene.options<FemSpec>().analysis == Analysis::by_scene && (damped || ramped || moving || scene.time.stop_unbalanced)))
         return std::make_unique<StaticFem>(scene, say);
     if (moving)
         throw SceneError(fmt::format("{}: walls move only in fem.analysis = \"static\" (the state at time.end)", scene.path));
@@ -302,7 +302,7 @@ std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
         throw SceneError(fmt::format("{}: fem.analysis = \"dynamic\" has no local damping; take the damping out (--set damping.local=0), "
                                      "or set fem.analysis = \"static\" for the state at rest",
                                      scene.path));
-    switch (scene.fem.integrator)
+    switch (scene.options<FemSpec>().integrator)
     {
     case FemSpec::Integrator::central_difference: return std::make_unique<CentralDifferenceFem>(scene, say);
     case FemSpec::Integrator::newmark: return std::make_unique<NewmarkFem>(scene, say);

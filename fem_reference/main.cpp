@@ -23,7 +23,7 @@ int run(int argc, char** argv)
         run_scene(options,
                   [&](const Scene& scene)
                   {
-                      if (family_of(scene) != Family::fem)
+                      if (method_of(scene).name != "fem")
                           throw SceneError(scene.path + ": method '" + scene.method + "' is not an FEM one; add --method fem-q2");
                       const auto refuse = [&](const std::string& message) { throw SceneError(scene.path + ": " + message); };
                       return make_fem(scene, options.strict ? Warn(refuse) : Warn());

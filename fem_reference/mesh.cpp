@@ -128,6 +128,6 @@ void make_mesh(const Scene& scene, const Lattice& lattice, const Warn& warn, dea
         cells.push_back(std::move(data));
     }
     mesh.create_triangulation(vertices, cells, dealii::SubCellData());
-    mesh.refine_global(static_cast<unsigned int>(scene.fem.refinements));
+    mesh.refine_global(static_cast<unsigned int>(scene.options<FemSpec>().refinements));
 }
 }  // namespace testbed

@@ -3,6 +3,7 @@
 
 #include "core/lattice/grid.hpp"
 #include "core/scene/scene.hpp"
+#include "fem_reference/options.hpp"
 
 #include <deal.II/grid/tria.h>
 #include <functional>
@@ -25,6 +26,6 @@ void make_mesh(const Scene& scene, const Lattice& lattice, const Warn& warn, dea
 /// Cells of the refined mesh along one lattice cell.
 inline int cells_per_lattice_cell(const Scene& scene)
 {
-    return 1 << scene.fem.refinements;
+    return 1 << scene.options<FemSpec>().refinements;
 }
 }  // namespace testbed

@@ -2,6 +2,7 @@
 /// The frontier of the material: nodes that it reaches or leaves from one step to the next.
 
 #include "lpfdm/free_faces.hpp"
+#include "lpfdm/options.hpp"
 
 #include <atomic>
 

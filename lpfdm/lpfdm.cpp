@@ -5,6 +5,7 @@
 #include "lpfdm/equations.hpp"
 #include "lpfdm/frontier.hpp"
 #include "lpfdm/initial_velocity.hpp"
+#include "lpfdm/options.hpp"
 #include "lpfdm/time_step.hpp"
 
 #include <cmath>
@@ -21,8 +22,8 @@ public:
         : Base(scene, {.box = Support::has_box}),
           grid_(without_numbers(make_lattice(scene.grid))),
           frontier_(grid_.lattice.nodes()),
-          options_(scene.lpfdm),
-          increment_{scene.lpfdm.convection == LpfdmSpec::Convection::two_sided ? 0.5 : 0.0}
+          options_(scene.options<LpfdmSpec>()),
+          increment_{scene.options<LpfdmSpec>().convection == LpfdmSpec::Convection::two_sided ? 0.5 : 0.0}
     {
         if (options_.convection == LpfdmSpec::Convection::two_sided)
         {
@@ -310,7 +311,7 @@ private:
 
 std::unique_ptr<Solver> make_lpfdm(const Scene& scene)
 {
-    switch (scene.lpfdm.support)
+    switch (scene.options<LpfdmSpec>().support)
     {
     case LpfdmSpec::Support::point: return std::make_unique<Lpfdm<PointSupport>>(scene);
     case LpfdmSpec::Support::domain: return std::make_unique<Lpfdm<DomainSupport>>(scene);

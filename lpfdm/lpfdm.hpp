@@ -8,6 +8,9 @@
 
 namespace testbed
 {
+/// Its row in the list of methods.
+Method lpfdm_method(MakeSolver make = {});
+
 /// @throws SceneError
 std::unique_ptr<Solver> make_lpfdm(const Scene& scene);
 }  // namespace testbed

@@ -20,9 +20,10 @@ class Mpm final : public ParticleSolver<Shape>
 public:
     explicit Mpm(const Scene& scene)
         : Base(scene, {.box = Shape::has_box, .velocity = true}),
-          grid_(without_numbers(make_lattice(scene.grid)), scene.mpm.mass_cutoff * cloud_.least_node_mass(scene.grid.cell_size)),
-          options_(scene.mpm),
-          increment_{scene.mpm.increment == MpmSpec::Increment::midpoint ? 0.5 : 0.0}
+          grid_(without_numbers(make_lattice(scene.grid)),
+                scene.options<MpmSpec>().mass_cutoff * cloud_.least_node_mass(scene.grid.cell_size)),
+          options_(scene.options<MpmSpec>()),
+          increment_{scene.options<MpmSpec>().increment == MpmSpec::Increment::midpoint ? 0.5 : 0.0}
     {
         if (options_.transfer == MpmSpec::Transfer::xpic)
             xpic_.emplace(options_.xpic_order);
@@ -327,12 +328,12 @@ private:
 
 std::unique_ptr<Solver> make_mpm(const Scene& scene)
 {
-    switch (scene.mpm.shape)
+    switch (scene.options<MpmSpec>().shape)
     {
     case MpmSpec::Shape::cpgimp: return std::make_unique<Mpm<GimpShape, PointStrain>>(scene);
     case MpmSpec::Shape::bspline: return std::make_unique<Mpm<BSplineShape, PointStrain>>(scene);
     case MpmSpec::Shape::linear:
-        if (scene.mpm.strain == MpmSpec::Strain::b_bar)
+        if (scene.options<MpmSpec>().strain == MpmSpec::Strain::b_bar)
             return std::make_unique<Mpm<LinearShape, BBarStrain>>(scene);
         return std::make_unique<Mpm<LinearShape, PointStrain>>(scene);
     }

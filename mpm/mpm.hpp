@@ -7,6 +7,9 @@
 
 namespace testbed
 {
+/// Its row in the list of methods.
+Method mpm_method(MakeSolver make = {});
+
 /// @throws SceneError
 std::unique_ptr<Solver> make_mpm(const Scene& scene);
 }  // namespace testbed

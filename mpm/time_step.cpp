@@ -169,7 +169,7 @@ std::vector<StepLimit> mpm_step_limits(const Lattice& lattice, const std::vector
     const double factor = damping_factor(alpha) * std::sqrt(0.5 * (1 + options.flip));
     std::vector<StepLimit> limits;
     if (options.scheme == MpmSpec::Scheme::usl)
-        limits.push_back({"cell content", content_limit<Shape>(lattice, bodies) * factor});
+        limits.push_back({"cell content", content_limit<Shape>(lattice, bodies) * factor, "mpm.scheme = \"musl\""});
     else
     {
         const double cell = lattice.cell_size * lattice.cell_size;

@@ -11,6 +11,7 @@
 
 #include "core/run/element_system.hpp"
 #include "core/run/time_step.hpp"
+#include "mpm/options.hpp"
 #include "mpm/transfer.hpp"
 
 namespace testbed

@@ -370,7 +370,7 @@ TEST(FemOperators, LinearFieldHasItsStressItsEnergyAndNoForceInside)
             const bool inside = X[0] > 1e-9 && X[0] < 2 - 1e-9 && X[1] > 1e-9 && X[1] < H - 1e-9;
             EXPECT_TRUE(!inside || std::abs(force(dof)) < 1e-13 * E) << X;
         }
-        const double share = scene.fem.degree == 1 ? 1 : 2 - 2.0 / 6;  // of the top side's two metres, less its corner nodes
+        const double share = scene.options<FemSpec>().degree == 1 ? 1 : 2 - 2.0 / 6;  // of the top side's two metres, less its corner nodes
         EXPECT_NEAR(on_top[0], sxy * share, 1e-10 * E);
         EXPECT_NEAR(on_top[1], syy * share, 1e-10 * E);
     }

@@ -1,6 +1,7 @@
 #include "lpfdm/convection.hpp"
 #include "lpfdm/equations.hpp"
 #include "lpfdm/lpfdm.hpp"
+#include "lpfdm/options.hpp"
 #include "tests/oracle.hpp"
 #include "tests/random.hpp"
 
@@ -151,7 +152,7 @@ TEST(Forces, PatchOfShiftedPoints)
                         {largest, std::abs(grid.nodes.fx[grid.lattice.node(i, j)]), std::abs(grid.nodes.fy[grid.lattice.node(i, j)])});
             return largest;
         };
-        return scene.lpfdm.support == LpfdmSpec::Support::point ? measure(PointSupport{}) : measure(DomainSupport{});
+        return scene.options<LpfdmSpec>().support == LpfdmSpec::Support::point ? measure(PointSupport{}) : measure(DomainSupport{});
     };
     EXPECT_LT(inner_force("lpfdm", 0.0), 1e-12);
     EXPECT_LT(inner_force("lpfdm", 0.13), 1e-12);
@@ -180,13 +181,13 @@ TEST_P(LpfdmOracle, SameTrajectories)
                              test::reference_points(scene),
                              c.domain,
                              c.central,
-                             scene.lpfdm.convection == LpfdmSpec::Convection::two_sided,
-                             scene.lpfdm.frontier == LpfdmSpec::Frontier::arrival};
+                             scene.options<LpfdmSpec>().convection == LpfdmSpec::Convection::two_sided,
+                             scene.options<LpfdmSpec>().frontier == LpfdmSpec::Frontier::arrival};
     // hourglass: the scene's coefficient times the fastest wave over L
     double wave_speed = 0;
     for (const Body& body : solver->bodies())
         wave_speed = std::max(wave_speed, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
-    reference.hourglass_rate = scene.lpfdm.hourglass * wave_speed / 0.5;
+    reference.hourglass_rate = scene.options<LpfdmSpec>().hourglass * wave_speed / 0.5;
     const std::size_t first_body = solver->bodies()[0].points.count;
     const auto velocity = [&](std::size_t p, Vec2 x)
     {

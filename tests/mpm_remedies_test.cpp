@@ -1,6 +1,7 @@
 /// XPIC, the null-space filter and nodes with little mass.
 
 #include "mpm/mpm.hpp"
+#include "mpm/options.hpp"
 #include "tests/oracle.hpp"
 
 #include <gtest/gtest.h>
@@ -197,9 +198,13 @@ TEST_P(RemedyOracle, SameTrajectories)
         settings.insert(settings.end(), {"mpm.transfer=xpic", "mpm.xpic_order=" + std::to_string(c.order)});
     const Scene scene = test::load(test::two_bodies() + "[gravity]\nacceleration = [0.4, -1.3]\n", c.method, settings);
     const auto solver = make_mpm(scene);
-    test::RefMpm reference{
-        {0.5, -1, -1}, test::reference_points(scene), name_of(scene.mpm.shape), c.scheme, 1, scene.mpm.strain == MpmSpec::Strain::b_bar,
-        true};
+    test::RefMpm reference{{0.5, -1, -1},
+                           test::reference_points(scene),
+                           name_of(scene.options<MpmSpec>().shape),
+                           c.scheme,
+                           1,
+                           scene.options<MpmSpec>().strain == MpmSpec::Strain::b_bar,
+                           true};
     reference.xpic = c.order;
     reference.least = c.cutoff * 1000 * 0.25;  // of the lighter body
     for (int n = 0; n < 40; ++n)

@@ -1,5 +1,6 @@
 #include "mpm/edges.hpp"
 #include "mpm/mpm.hpp"
+#include "mpm/options.hpp"
 #include "mpm/transfer.hpp"
 #include "tests/oracle.hpp"
 #include "tests/random.hpp"
@@ -226,12 +227,12 @@ TEST_P(MpmOracle, SameTrajectories)
     const auto solver = make_mpm(scene);
     test::RefMpm reference{{0.5, -1, -1},
                            test::reference_points(scene),
-                           name_of(scene.mpm.shape),
+                           name_of(scene.options<MpmSpec>().shape),
                            c.scheme,
                            c.flip,
-                           scene.mpm.strain == MpmSpec::Strain::b_bar,
-                           scene.mpm.increment == MpmSpec::Increment::midpoint};
-    reference.least = scene.mpm.mass_cutoff * 1000 * 0.25;  // of the lighter body
+                           scene.options<MpmSpec>().strain == MpmSpec::Strain::b_bar,
+                           scene.options<MpmSpec>().increment == MpmSpec::Increment::midpoint};
+    reference.least = scene.options<MpmSpec>().mass_cutoff * 1000 * 0.25;  // of the lighter body
     for (int n = 0; n < 40; ++n)
     {
         solver->prepare(n * 0.01, 0.01);

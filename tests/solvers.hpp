@@ -13,6 +13,6 @@ inline const std::vector<std::string> all_methods{"lpfdm-2000", "lpfdm", "mpm-li
 
 inline std::unique_ptr<Solver> make(const Scene& scene)
 {
-    return family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene);
+    return method_of(scene).make(scene);
 }
 }  // namespace testbed::test

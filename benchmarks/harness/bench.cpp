@@ -81,14 +81,13 @@ std::vector<std::string> settings(const std::string& law, double points)
     return {fmt::format("grid.cell_size={:.17g}", L), fmt::format("time.dt={:.17g}", 5e-4 * L)};
 }
 
-Measurement measure(const std::string& method, const std::string& law, double points, int team, double seconds,
-                    const MakeSolver& make_solver)
+Measurement measure(const std::string& method, const std::string& law, double points, int team, double seconds)
 {
     set_threads(team);
     const Stopwatch setup;
     const std::string scene_path = std::string(BENCHMARKS) + (law == "elastic" ? "/elastic/speed/scene.toml" : "/soil/cliff/scene.toml");
     const Scene scene = load_scene(scene_path, method, settings(law, points)).scene;
-    const std::unique_ptr<Solver> solver = make_solver(scene);
+    const std::unique_ptr<Solver> solver = method_of(scene).make(scene);
     Measurement m;
     m.method = method;
     m.law = law;
@@ -143,12 +142,13 @@ Plan plan_of(const BenchOptions& options, int cores)
     if (plan.laws.empty())
         plan.laws = {"elastic", "mohr_coulomb"};
     if (plan.methods.empty())
-        for (const Variant& v : variants())
-            if (v.family != Family::fem)
-                plan.methods.emplace_back(v.name);
+        for (const Method& method : methods())
+            for (const Variant& variant : method.variants)
+                if (method.make)
+                    plan.methods.push_back(variant.name);
     for (const std::string& method : plan.methods)
-        if (find_variant(method).family == Family::fem)
-            throw SceneError("bench: the FEM reference has no particles");
+        if (!find_method(method).make)
+            throw SceneError(fmt::format("bench: '{}' is a program of its own, and has no particles", method));
     for (const double points : options.points)
         if (!(points >= 16 && points <= 1e9))
             throw SceneError(fmt::format("bench: --points from 16 to 1e9, not {}", points));
@@ -211,7 +211,7 @@ std::string csv_row(const Measurement& m)
 }
 }  // namespace
 
-void bench(const BenchOptions& options, const MakeSolver& make_solver)
+void bench(const BenchOptions& options)
 {
     const Machine machine;
     const Plan plan = plan_of(options, machine.cores);
@@ -229,7 +229,7 @@ void bench(const BenchOptions& options, const MakeSolver& make_solver)
                 for (std::size_t k = 0; k < plan.teams.size(); ++k)
                     try
                     {
-                        Measurement m = measure(method, law, points, plan.teams[k], options.seconds, make_solver);
+                        Measurement m = measure(method, law, points, plan.teams[k], options.seconds);
                         m.triad = triad[k];
                         print_row(m);
                         csv << csv_row(m) << std::flush;

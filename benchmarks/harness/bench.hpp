@@ -15,5 +15,5 @@ struct BenchOptions
 };
 
 /// Prints a table and writes the CSV file as it goes, a row per measurement; a run that diverges is told. @throws SceneError, OutputError
-void bench(const BenchOptions& options, const MakeSolver& make_solver);
+void bench(const BenchOptions& options);
 }  // namespace testbed

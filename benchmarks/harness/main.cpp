@@ -9,8 +9,6 @@
 #include "core/run/step_control.hpp"
 #include "core/scene/geometry.hpp"
 #include "core/scene/method_limits.hpp"
-#include "lpfdm/lpfdm.hpp"
-#include "mpm/mpm.hpp"
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
@@ -52,14 +50,9 @@ std::filesystem::path own_directory()
                                  program, std::strerror(errno)));
 }
 
-std::unique_ptr<Solver> make_particle_solver(const Scene& scene)
-{
-    return family_of(scene) == Family::mpm ? make_mpm(scene) : make_lpfdm(scene);
-}
-
 std::string fields_and_modules(const Scene& scene, Solver& solver)
 {
-    std::vector<std::string> fields, modules{name_of(family_of(scene))};
+    std::vector<std::string> fields, modules{method_of(scene).name};
     for (const Body& body : solver.bodies())
         body.points.for_each_field(
             [&](const auto& f)
@@ -109,7 +102,6 @@ void check(const RunOptions& options, bool resolved)
         fmt::print("{}", resolved_toml(scene));
         return;
     }
-    const bool is_fem = family_of(scene) == Family::fem;
     fmt::print("scene            {}\nmethod           {}\n", scene.path, variant_label(scene));
     fmt::print("lattice          {:.0f} x {:.0f} cells of {} m\n", scene.grid.size[0] / scene.grid.cell_size,
                scene.grid.size[1] / scene.grid.cell_size, scene.grid.cell_size);
@@ -123,14 +115,14 @@ void check(const RunOptions& options, bool resolved)
     for (const BodySpec& body : scene.bodies)
         points += fill(scene, body).size();
     fmt::print("points           {}\n", points);
-    if (is_fem)
+    if (!traits_of(scene).has_points)
     {
         fmt::print("time step        {:.5g} s, critical {:.5g} s, {:.0f} steps\n", time_step(scene), critical_time_step(scene),
                    std::ceil(scene.time.end / time_step(scene)));
         fmt::print("the FEM reference samples its solution at these points; it keeps no particle fields\n");
         return;
     }
-    const std::unique_ptr<Solver> solver = make_particle_solver(scene);
+    const std::unique_ptr<Solver> solver = method_of(scene).make(scene);
     if (const std::string warning = step_warning(scene, *solver); !warning.empty())
         warn(options, warning);
     const double dt = time_step(scene, *solver);
@@ -149,8 +141,9 @@ void check(const RunOptions& options, bool resolved)
 void list()
 {
     fmt::print("methods (for `method` in a scene, or --method)\n");
-    for (const Variant& v : variants())
-        fmt::print("  {:<16} {}\n", v.name, v.description);
+    for (const Method& method : methods())
+        for (const Variant& v : method.variants)
+            fmt::print("  {:<16} {}\n", v.name, v.description);
     fmt::print("laws (for `law` of a material)\n");
     for (const std::string& law : names_of<MaterialSpec::Law>())
         fmt::print("  {}\n", law);
@@ -255,20 +248,20 @@ int run(int argc, char** argv)
     }
     if (line.run->parsed())
     {
-        const std::string method = load(line.options).scene.method;
-        if (find_variant(method).family == Family::fem)
-            become("testbed-fem", rest_of(argc, argv, 2));
-        return static_cast<int>(run_scene(line.options, make_particle_solver));
+        const Method& method = method_of(load(line.options).scene);
+        if (!method.make)
+            become("testbed-" + method.name, rest_of(argc, argv, 2));
+        return static_cast<int>(run_scene(line.options, method.make));
     }
     if (line.check->parsed())
         check(line.options, line.resolved);
     else if (line.point->parsed())
         point(line.law, line.csv);
     else if (line.bench->parsed())
-        bench(line.bench_options, make_particle_solver);
+        bench(line.bench_options);
     else if (line.modes->parsed())
     {
-        if (const auto picture = modes(line.modes_options, make_particle_solver))
+        if (const auto picture = modes(line.modes_options))
             become("testbed-modes-plot", {picture->first, picture->second});
     }
     else if (line.doc->parsed())

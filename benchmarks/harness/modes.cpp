@@ -81,15 +81,15 @@ Findings find(const ModesOptions& options, const Scene& scene, Solver& solver)
 }
 }  // namespace
 
-std::optional<std::pair<std::string, std::string>> modes(const ModesOptions& options, const MakeSolver& make_solver)
+std::optional<std::pair<std::string, std::string>> modes(const ModesOptions& options)
 {
     const std::filesystem::path output = options.scene.output;
     if (!output.empty() && output.extension() != ".h5" && output.extension() != ".csv" && output.extension() != ".png")
         throw SceneError(fmt::format("modes: '{}' is none of .h5, .csv, .png", output.string()));
     const Scene scene = load_and_warn(options.scene);
-    if (family_of(scene) == Family::fem)
+    if (!method_of(scene).make)
         throw SceneError("modes: the FEM reference has no state that is stepped by particles; take an LPFDM or MPM method");
-    const std::unique_ptr<Solver> solver = make_solver(scene);
+    const std::unique_ptr<Solver> solver = method_of(scene).make(scene);
     const Findings f = [&]
     {
         try

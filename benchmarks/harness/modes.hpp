@@ -21,5 +21,5 @@ struct ModesOptions
 
 /// Prints the modes, writes them to a file if one is asked for. Returns the pair (file of modes, picture to be drawn) if that is a .png.
 /// @throws SceneError, also for a state of too many unknowns
-std::optional<std::pair<std::string, std::string>> modes(const ModesOptions& options, const MakeSolver& make_solver);
+std::optional<std::pair<std::string, std::string>> modes(const ModesOptions& options);
 }  // namespace testbed

@@ -17,8 +17,7 @@ constexpr double slack = 1e-6;  // cells
 /// and later where the soil is stretched: the whole distance is taken.
 double reach_of(const Scene& scene)
 {
-    const bool mass_in_the_middle =
-        family_of(scene) == Family::mpm ? scene.mpm.shape == MpmSpec::Shape::linear : scene.lpfdm.support == LpfdmSpec::Support::point;
+    const bool mass_in_the_middle = traits_of(scene).reach == 1;
     int fewest = std::numeric_limits<int>::max();
     for (const BodySpec& body : scene.bodies)
         fewest = std::min(fewest, body.points_per_cell);

@@ -179,11 +179,11 @@ std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene)
     const bool is_held = !scene.boundaries.empty() || !scene.walls.empty();
     const bool is_damped = scene.damping && scene.damping->local > 0;
     guards.push_back(std::make_unique<EnergyGuard>());
-    if (!is_damped && !scene.may_flow() && family_of(scene) != Family::fem)
+    if (!is_damped && !scene.may_flow() && traits_of(scene).has_points)
         guards.push_back(std::make_unique<LossGuard>());
     if (scene.gravity)
         guards.push_back(std::make_unique<GravityGuard>(scene.may_flow()));
-    if (family_of(scene) == Family::lpfdm && scene.lpfdm.hourglass > 0)
+    if (traits_of(scene).damps_hourglass)
         guards.push_back(std::make_unique<HourglassGuard>());
     if (!is_loaded && !is_held && !is_damped && !scene.gravity)
         guards.push_back(std::make_unique<MomentumGuard>());

@@ -24,48 +24,6 @@ bool found(const RunFacts& facts, const char* code)
     return std::any_of(facts.findings.begin(), facts.findings.end(), [&](const Finding& f) { return f.code == code; });
 }
 
-struct Method
-{
-    bool is_mpm, point_support, linear, b_bar;
-    double hourglass;
-    bool usl;
-};
-
-Method method_of(const Scene& scene)
-{
-    const bool mpm = family_of(scene) == Family::mpm;
-    return {mpm,
-            !mpm && scene.lpfdm.support == LpfdmSpec::Support::point,
-            mpm && scene.mpm.shape == MpmSpec::Shape::linear,
-            mpm && scene.mpm.strain == MpmSpec::Strain::b_bar,
-            mpm ? 0 : scene.lpfdm.hourglass,
-            mpm && scene.mpm.scheme == MpmSpec::Scheme::usl};
-}
-
-/// A support by domains, for methods that have none.
-std::string wider_support(const Method& m)
-{
-    return m.point_support ? "lpfdm.support=domain" : m.linear ? "mpm.shape=cpgimp" : "";
-}
-
-std::string null_mode_remedy(const Scene& scene, const Method& m)
-{
-    if (!m.is_mpm)
-        return m.hourglass == 0 ? "lpfdm.hourglass=0.05" : "";
-    if (m.linear)
-        return scene.mpm.null_space_filter == MpmSpec::Filter::none ? "mpm.null_space_filter=cell" : "";
-    return scene.mpm.flip == 1 ? "mpm.flip=0.99" : "";
-}
-
-std::string sliver_remedy(const Scene& scene, const Method& m)
-{
-    if (m.is_mpm)
-        return scene.mpm.mass_cutoff < sliver_mass ? "mpm.mass_cutoff=0.001" : "";
-    return m.point_support                                              ? wider_support(m)
-           : scene.lpfdm.convection != LpfdmSpec::Convection::two_sided ? "lpfdm.convection=two_sided"
-                                                                        : "";
-}
-
 /// The time step times a share, as the scene gives it.
 std::string smaller_step(const Scene& scene, const RunFacts& facts, double share)
 {
@@ -166,44 +124,44 @@ Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& fac
     const bool nearly_incompressible = std::any_of(scene.materials.begin(), scene.materials.end(),
                                                    [](const MaterialSpec& material) { return material.poissons_ratio > 0.45; });
     const auto [lattice, nodes] = solver.nodes();
+    const Traits traits = traits_of(scene);
+    const Remedies& remedies = traits.remedies;
+    const bool locks = traits.may_lock && nearly_incompressible;
     if (!lattice)  // the FEM reference
-        return found(facts, "noise") && nearly_incompressible ? Diagnosis{"locking", scene.fem.degree == 1 ? "fem.degree=2" : ""}
-                                                              : Diagnosis{};
-    const Method m = method_of(scene);
+        return found(facts, "noise") && locks ? Diagnosis{"locking", remedies.locking} : Diagnosis{};
+    const bool in_one_cell = traits.reach == 1;
     const auto& bodies = solver.bodies();
     if (found(facts, "time_step"))
         return {"time_step", smaller_step(scene, facts, 0.9 * facts.dt_critical / facts.dt)};
     if (found(facts, "separated") || found(facts, "contact_lost"))
-        return {"separation", wider_support(m)};
+        return {"separation", remedies.crossing};
     // points that fly too fast from the start, not such that something has thrown
     const double courant = solver.point_motion().speed * facts.dt / lattice->cell_size;
     if (courant > fast && !found(facts, "energy") && !found(facts, "volume"))
         return {"time_step", smaller_step(scene, facts, fast / (2 * courant))};
     // the last motion of a body that came to rest tells nothing of its stresses
     if (!found(facts, "crossing") && checkerboard_share(*lattice, *nodes) > pattern_rules)
-        return {"null_mode", null_mode_remedy(scene, m)};
+        return {"null_mode", remedies.null_mode};
     const double oscillation = stress_oscillation(bodies, *lattice);
     const bool noise = found(facts, "noise");
-    if (m.is_mpm && !m.b_bar && nearly_incompressible && (noise || (m.linear && oscillation > oscillates)))
-        return {"locking", m.linear ? "mpm.strain=b_bar" : ""};
+    if (locks && (noise || (in_one_cell && oscillation > oscillates)))
+        return {"locking", remedies.locking};
     if (found(facts, "crossing"))
-        return {"crossing", wider_support(m)};
+        return {"crossing", remedies.crossing};
     if (found(facts, "released"))
-        return {m.point_support || m.linear ? "crossing" : "separation", wider_support(m)};
+        return {in_one_cell ? "crossing" : "separation", remedies.crossing};
     if (found(facts, "mixed_cells"))
         return {"mixed_cells", ""};
     if (found(facts, "drift"))
         return {"ratchet", smaller_step(scene, facts, 0.5)};
     if (noise)
-        return {"null_mode", null_mode_remedy(scene, m)};
+        return {"null_mode", remedies.null_mode};
     if (largest_volume_ratio(bodies) > grown)
-        return {"tension", m.point_support && scene.lpfdm.volume_cap == 0 ? "lpfdm.volume_cap=2.0" : ""};
-    if (m.usl)
-        return {"sliver", "mpm.scheme=musl"};
-    if (mass_of_fastest(*nodes, full_mass(bodies, lattice->cell_size)) < sliver_mass)
-        return {"sliver", sliver_remedy(scene, m)};
-    if ((m.point_support || m.linear) && oscillation > oscillates)
-        return {"crossing", wider_support(m)};
+        return {"tension", remedies.tension};
+    if (traits.divides_by_slivers || mass_of_fastest(*nodes, full_mass(bodies, lattice->cell_size)) < sliver_mass)
+        return {"sliver", remedies.sliver};
+    if (in_one_cell && oscillation > oscillates)
+        return {"crossing", remedies.crossing};
     return {};
 }
 }  // namespace testbed

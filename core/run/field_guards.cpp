@@ -24,8 +24,7 @@ class NoiseGuard final : public Remembering<NoiseGuard>
 public:
     explicit NoiseGuard(const Scene& scene) : is_free_(scene.boundaries.empty() && scene.walls.empty()), lattice_(make_lattice(scene.grid))
     {
-        const bool fem = family_of(scene) == Family::fem;
-        mesh_ = scene.grid.cell_size / (fem ? std::pow(2.0, scene.fem.refinements) : 1.0);
+        mesh_ = scene.grid.cell_size / traits_of(scene).elements_per_cell;
     }
     void watch(const GuardSample& s, const Solver&) override
     {
@@ -96,7 +95,7 @@ CellKey cell_of(const Lattice& lattice, const Points& q, std::size_t p)
 class CrossingGuard final : public Remembering<CrossingGuard>
 {
 public:
-    explicit CrossingGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)), shares_cells_(family_of(scene) == Family::lpfdm) {}
+    explicit CrossingGuard(const Scene& scene) : lattice_(make_lattice(scene.grid)), shares_cells_(traits_of(scene).shares_cells) {}
     void watch(const GuardSample&, const Solver& solver) override
     {
         if (at_start_.empty())
@@ -231,10 +230,10 @@ std::vector<std::unique_ptr<Guard>> field_guards(const Scene& scene)
     if (scene.may_flow())
         return guards;
     guards.push_back(std::make_unique<NoiseGuard>(scene));
-    const Family family = family_of(scene);
-    if (family == Family::fem)
+    const Traits traits = traits_of(scene);
+    if (!traits.has_points)
         return guards;
-    if (family == Family::mpm ? scene.mpm.shape == MpmSpec::Shape::linear : scene.lpfdm.support == LpfdmSpec::Support::point)
+    if (traits.reach == 1)
         guards.push_back(std::make_unique<CrossingGuard>(scene));
     if (scene.bodies.size() > 1)
         guards.push_back(std::make_unique<MixedCellsGuard>(scene));

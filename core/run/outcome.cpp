@@ -91,7 +91,7 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
     file.attribute("/", "format_version", std::int64_t{1});
     file.attribute("/", "case", scene.case_name());
     file.attribute("/", "title", scene.title);
-    file.attribute("/", "method", name_of(family_of(scene)));
+    file.attribute("/", "method", method_of(scene).name);
     file.attribute("/", "variant", variant_label(scene));
     file.attribute("/", "kinematics", std::string(solver.kinematics()));
     file.attribute("/scene", "resolved", resolved_toml(scene));

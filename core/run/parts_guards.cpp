@@ -16,7 +16,7 @@ bool has_strength(const Scene& scene, const BodySpec& body)
 class SeparationGuard final : public Remembering<SeparationGuard>
 {
 public:
-    explicit SeparationGuard(const Scene& scene) : reach_(reach_of(scene))
+    explicit SeparationGuard(const Scene& scene) : reach_(traits_of(scene).reach)
     {
         for (const BodySpec& body : scene.bodies)
             bodies_.push_back({body.name, has_strength(scene, body)});
@@ -75,7 +75,7 @@ private:
 class ContactGuard final : public Remembering<ContactGuard>
 {
 public:
-    explicit ContactGuard(const Scene& scene) : reach_(reach_of(scene))
+    explicit ContactGuard(const Scene& scene) : reach_(traits_of(scene).reach)
     {
         for (const BodySpec& body : scene.bodies)
             names_.push_back(body.name);
@@ -189,13 +189,6 @@ bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach)
     for (const Bin& bin : a)
         for_each_near(keys, {bin.j, bin.i}, reach, [&](std::size_t) { touch = true; });
     return touch;
-}
-
-int reach_of(const Scene& scene)
-{
-    if (family_of(scene) == Family::mpm)
-        return scene.mpm.shape == MpmSpec::Shape::linear ? 1 : 2;
-    return scene.lpfdm.support == LpfdmSpec::Support::point ? 1 : 2;
 }
 
 std::vector<std::unique_ptr<Guard>> parts_guards(const Scene& scene)

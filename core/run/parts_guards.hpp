@@ -9,8 +9,6 @@ namespace testbed
 std::size_t connected_parts(const std::vector<Bin>& bins, int reach);
 /// Whether two bodies share a node.
 bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach);
-/// Bins at which two points still share a node.
-int reach_of(const Scene& scene);
 /// separated, contact_lost.
 std::vector<std::unique_ptr<Guard>> parts_guards(const Scene& scene);
 }  // namespace testbed

@@ -33,8 +33,6 @@ struct RunOptions
     bool diagnose = false;  ///< a failed or suspect run is run once more with the remedy that was found
 };
 
-using MakeSolver = std::function<std::unique_ptr<Solver>(const Scene&)>;
-
 /// The scene that the options mean. @throws SceneError
 LoadedScene load(const RunOptions& options);
 /// Loads the scene, says its warnings on stderr. @throws SceneError, also for a warning if strict

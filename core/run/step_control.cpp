@@ -57,8 +57,7 @@ void StepControl::follow()
     const StepLimit& least = governing(limits);
     if (!(least.seconds > 1e-6 * critical_))
         throw Diverged(fmt::format("the limit of the time step has fallen from {:.4g} s to {:.4g} s ({}){}", critical_, least.seconds,
-                                   least.name,
-                                   least.name == std::string("cell content") ? "; mpm.scheme = \"musl\" has no such limit" : ""));
+                                   least.name, *least.way_out ? fmt::format("; {} has no such limit", least.way_out) : ""));
     const double dt = std::min(cfl_ * least.seconds, 1.05 * dt_), left = end_ - t_;
     dt_ = left / std::ceil(left / dt * (1 - 1e-12));
     shortest_ = std::min(shortest_, dt_);

@@ -13,6 +13,7 @@ struct StepLimit
 {
     const char* name;
     double seconds;
+    const char* way_out = "";  ///< a setting without this limit
 };
 
 /// The least of all. @param limits not empty

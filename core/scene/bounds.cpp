@@ -44,7 +44,7 @@ void check_bounds(const Scene& scene, Problems& problems)
         ask(moduli.shear(), key, "the shear modulus", "Pa");
         ask(moduli.constrained() / m.density, key, "the square of the wave speed", "m^2/s^2");
     }
-    if (!problems.errors().empty() || family_of(scene) == Family::fem)
+    if (!problems.errors().empty() || !traits_of(scene).has_points)
         return;
     constexpr double most_steps = 1e12;
     const double dt = time_step(scene), steps = scene.time.end / dt;

@@ -93,41 +93,6 @@ void check_output(const OutputSpec& output, Problems& problems)
     if (output.snapshots < 0 || output.snapshots > 9999)
         problems.add("output.snapshots", "between 0 and 9999 is asked");
 }
-
-void check_lpfdm(const LpfdmSpec& lpfdm, Problems& problems)
-{
-    if (!(lpfdm.volume_cap == 0 || lpfdm.volume_cap >= 1))
-        problems.add("lpfdm.volume_cap", fmt::format("0 (no limit) or at least 1 is asked, not {}", lpfdm.volume_cap));
-    else if (lpfdm.volume_cap > 0 && lpfdm.support != LpfdmSpec::Support::point)
-        problems.add("lpfdm.volume_cap", "only for support = \"point\"");
-    if (lpfdm.hourglass < 0 || lpfdm.hourglass > 0.5)
-        problems.add("lpfdm.hourglass",
-                     fmt::format("must lie in [0, 0.5], beyond that it is unstable at the critical time step; not {}", lpfdm.hourglass));
-}
-
-void check_mpm(const MpmSpec& mpm, Problems& problems)
-{
-    if (mpm.flip < 0 || mpm.flip > 1)
-        problems.add("mpm.flip", fmt::format("must lie in [0, 1], not {}", mpm.flip));
-    if (mpm.strain == MpmSpec::Strain::b_bar && mpm.shape != MpmSpec::Shape::linear)
-        problems.add("mpm.strain", "b_bar averages over a cell and needs shape = \"linear\"");
-    if (mpm.xpic_order < 1 || mpm.xpic_order > 20)
-        problems.add("mpm.xpic_order", fmt::format("must lie in [1, 20], not {}", mpm.xpic_order));
-    if (mpm.transfer == MpmSpec::Transfer::xpic && mpm.flip != 1)
-        problems.add("mpm.flip", "blends FLIP with PIC; transfer = \"xpic\" has no use for it");
-    if (mpm.null_space_filter != MpmSpec::Filter::none && mpm.shape != MpmSpec::Shape::linear)
-        problems.add("mpm.null_space_filter", "works cell by cell and needs shape = \"linear\"; for wider shapes take transfer = \"xpic\"");
-    if (!(mpm.mass_cutoff >= 0 && mpm.mass_cutoff <= 0.25))
-        problems.add("mpm.mass_cutoff", fmt::format("must lie in [0, 0.25], not {}", mpm.mass_cutoff));
-}
-
-void check_fem(const FemSpec& fem, Problems& problems)
-{
-    if (fem.degree != 1 && fem.degree != 2)
-        problems.add("fem.degree", fmt::format("1 or 2 is asked, not {}", fem.degree));
-    if (fem.refinements < 0 || fem.refinements > 10)
-        problems.add("fem.refinements", "between 0 and 10 is asked");
-}
 }  // namespace
 
 void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& problems)
@@ -160,33 +125,20 @@ void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& proble
     check_curves(scene.report, problems);
     check_unique_names(scene.probes, "probe", problems);
     check_output(scene.output, problems);
-    check_lpfdm(scene.lpfdm, problems);
-    check_mpm(scene.mpm, problems);
-    check_fem(scene.fem, problems);
+    for (const Method& method : methods())
+        method.check(scene, problems);
 }
 
 void check_limits(const Scene& scene, Problems& problems)
 {
-    for (std::size_t k = 0; k < scene.bodies.size(); ++k)
-        if (scene.bodies[k].initial_stress && family_of(scene) == Family::fem)
-            problems.warn(fmt::format("body[{}].initial_stress", k), "the FEM reference starts without stress: it is left out");
     if (scene.confinement && scene.confinement->pressure > 0)
         for (std::size_t k = 0; k < scene.bodies.size(); ++k)
             if (!scene.bodies[k].initial_stress)
                 problems.warn(fmt::format("body[{}].initial_stress", k),
                               "missing: the confining pressure hits a body without stress at once");
-    if (scene.confinement && family_of(scene) == Family::fem)
-        problems.warn("confinement", "the FEM reference leaves it out, as it does the initial stress that balances it");
-    if (!scene.tractions.empty() && family_of(scene) == Family::lpfdm && scene.lpfdm.support == LpfdmSpec::Support::domain)
-        problems.warn("traction",
-                      "domains reach into the cells outside a loaded face, and what they hold there may run away; use [confinement] "
-                      "for a pressure, or lpfdm.support = \"point\"");
-    const Family family = family_of(scene);
     for (std::size_t k = 0; k < scene.materials.size(); ++k)
     {
         const MaterialSpec& m = scene.materials[k];
-        if (family == Family::fem && m.has_strength())
-            problems.warn(fmt::format("material[{}].law", k), "the FEM reference is elastic: strength is left out");
         if (m.softening && m.softening->nonlocal && scene.grid.cell_size > 0.5 * m.softening->nonlocal->internal_length)
             problems.warn(fmt::format("material[{}].softening.nonlocal", k),
                           fmt::format("the cell size {} m does not resolve the internal length {} m: at most half of it is asked",
@@ -195,25 +147,12 @@ void check_limits(const Scene& scene, Problems& problems)
             problems.warn(fmt::format("material[{}].softening.band_thickness", k),
                           fmt::format("crack-band scaling needs cells at least as large as the band, {} m", *m.softening->band_thickness));
     }
-    if (family == Family::mpm && scene.mpm.shape == MpmSpec::Shape::bspline)
-    {
-        const auto inside = [&](const Vec2& low, const Vec2& high)
-        {
-            const double slack = 1e-6 * scene.grid.cell_size;
-            bool is_inside = true;
-            for (std::size_t k = 0; k < 2; ++k)
-                is_inside &= high[k] > scene.grid.origin[k] + slack && low[k] < scene.grid.origin[k] + scene.grid.size[k] - slack;
-            return is_inside;
-        };
-        for (std::size_t k = 0; k < scene.walls.size(); ++k)
-            if (inside(scene.walls[k].min, scene.walls[k].max))
-                problems.warn(fmt::format("wall[{}]", k),
-                              "quadratic B-splines are right at the edges of the lattice alone: at a wall inside it the "
-                              "velocity that points see is not the wall's, and the first cells beside it are wrong");
-    }
-    const bool locks =
-        (family == Family::mpm && scene.mpm.strain == MpmSpec::Strain::four_point) || (family == Family::fem && scene.fem.degree == 1);
-    for (std::size_t k = 0; k < scene.materials.size() && locks; ++k)
+    method_of(scene).warn(scene, problems);
+}
+
+void warn_of_locking(const Scene& scene, Problems& problems)
+{
+    for (std::size_t k = 0; k < scene.materials.size(); ++k)
         if (scene.materials[k].poissons_ratio > 0.45)
             problems.warn(fmt::format("material[{}].poissons_ratio", k),
                           fmt::format("{} locks when nearly incompressible (nu = {})", scene.method, scene.materials[k].poissons_ratio));

@@ -140,6 +140,12 @@ toml::table parse_toml(const std::string& text, const std::string& path)
     }
 }
 
+Scene::Scene()
+{
+    for (const Method& m : methods())
+        method_options.push_back(m.options);
+}
+
 const MaterialSpec& Scene::material(const std::string& name) const
 {
     return *std::find_if(materials.begin(), materials.end(), [&](const auto& m) { return m.name == name; });
@@ -220,9 +226,7 @@ LoadedScene load_scene_text(const std::string& text, const std::string& path, co
     Scene& scene = loaded.scene;
     scene.path = path;
     const std::string name = root["method"].value_or(scene.method);
-    std::vector<std::string> names;
-    for (const Variant& v : variants())
-        names.push_back(v.name);
+    const std::vector<std::string> names = variant_names();
     if (const toml::node* node = root.get("method"))
         problems.remember("method", *node);
     if (std::find(names.begin(), names.end(), name) == names.end())
@@ -250,35 +254,5 @@ LoadedScene load_scene_text(const std::string& text, const std::string& path, co
     throw_if_any();
     loaded.warnings = problems.warnings();
     return loaded;
-}
-
-const std::vector<Variant>& variants()
-{
-    static const std::vector<Variant> list{
-        {"lpfdm-2000", Family::lpfdm, "as published: a point belongs to one cell, upwind convection, no hourglass control",
-         [](Scene& s) {
-             s.lpfdm = {LpfdmSpec::Support::point, LpfdmSpec::Convection::upwind, LpfdmSpec::Frontier::extrapolate, 0.0};
-         }},
-        {"lpfdm", Family::lpfdm, "each point has a domain, convection on both sides of the forces, hourglass control",
-         [](Scene& s) { s.lpfdm = LpfdmSpec{}; }},
-        {"mpm-linear", Family::mpm, "linear shape functions, strain at each point, FLIP, MUSL", [](Scene& s) { s.mpm = MpmSpec{}; }},
-        {"mpm-linear-bbar", Family::mpm, "linear shape functions, volumetric strain averaged over each cell, FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.strain = MpmSpec::Strain::b_bar}; }},
-        {"mpm-bspline", Family::mpm, "quadratic B-splines, linear at the edges of the lattice; FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.shape = MpmSpec::Shape::bspline, .mass_cutoff = 1e-14}; }},
-        {"mpm-cpgimp", Family::mpm, "contiguous-particle GIMP: each point's box stretches with it; FLIP, MUSL",
-         [](Scene& s) { s.mpm = {.shape = MpmSpec::Shape::cpgimp, .mass_cutoff = 1e-14}; }},
-        {"fem-q1", Family::fem, "small-strain reference, bilinear elements", [](Scene& s) { s.fem.degree = 1; }},
-        {"fem-q2", Family::fem, "small-strain reference, biquadratic elements", [](Scene& s) { s.fem.degree = 2; }},
-    };
-    return list;
-}
-
-const Variant& find_variant(const std::string& name)
-{
-    for (const Variant& v : variants())
-        if (v.name == name)
-            return v;
-    throw SceneError("no method '" + name + "'");
 }
 }  // namespace testbed

@@ -3,12 +3,13 @@
 /// `testbed doc` and the writer of the resolved scene.
 
 #include "core/materials/material_spec.hpp"
-#include "core/scene/method_specs.hpp"
+#include "core/scene/method.hpp"
 #include "core/scene/tables.hpp"
 
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -33,12 +34,11 @@ struct Scene
     std::map<std::string, ExactSpec> exact;  ///< by kinematics
     OutputSpec output;
     ReportSpec report;
-    LpfdmSpec lpfdm;
-    MpmSpec mpm;
-    FemSpec fem;
+    std::vector<MethodOptions> method_options;  ///< in the order of methods()
 
     std::string path;  ///< as given by the user
 
+    Scene();
     template <class V>
     void describe(V& v)
     {
@@ -61,11 +61,24 @@ struct Scene
         v.tables("exact", exact, {"small_strain", "hypoelastic"}, "exact solution for methods that integrate this law");
         v.table("output", output, "what is written");
         v.table("report", report, "what is graded");
-        v.table("lpfdm", lpfdm, "options of LPFDM");
-        v.table("mpm", mpm, "options of MPM");
-        v.table("fem", fem, "options of the FEM reference");
+        for (std::size_t m = 0; m < method_options.size(); ++m)
+            v.table(methods()[m].name.c_str(), method_options[m], methods()[m].about);
     }
 
+    /// The table of the method whose options these are. @throws std::logic_error if there is no such method
+    template <class Options>
+    Options& options()
+    {
+        for (MethodOptions& table : method_options)
+            if (Options* found = table.as<Options>())
+                return *found;
+        throw std::logic_error("options of a method that is not in the list");
+    }
+    template <class Options>
+    const Options& options() const
+    {
+        return const_cast<Scene*>(this)->options<Options>();
+    }
     /// Name of the folder that holds the scene.
     std::string case_name() const { return std::filesystem::absolute(path).lexically_normal().parent_path().filename().string(); }
     const MaterialSpec& material(const std::string& name) const;
@@ -75,32 +88,6 @@ struct Scene
     /// Constants with L, as expressions see them.
     Constants expression_constants() const;
 };
-
-enum class Family
-{
-    lpfdm,
-    mpm,
-    fem
-};
-constexpr auto names(Family)
-{
-    return choice_names<Family>({{Family::lpfdm, "lpfdm"}, {Family::mpm, "mpm"}, {Family::fem, "fem"}});
-}
-
-/// A family with a named set of options.
-struct Variant
-{
-    std::string name;
-    Family family;
-    std::string description;
-    void (*apply)(Scene&);
-};
-const std::vector<Variant>& variants();
-const Variant& find_variant(const std::string& name);
-inline Family family_of(const Scene& scene)
-{
-    return find_variant(scene.method).family;
-}
 
 /// The name of the scene's variant, with the options that the scene changes in brackets.
 std::string variant_label(const Scene& scene);

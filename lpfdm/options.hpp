@@ -1,0 +1,66 @@
+#pragma once
+/// What a scene says of LPFDM: its table [lpfdm].
+
+#include "core/base/choice.hpp"
+
+namespace testbed
+{
+struct LpfdmSpec
+{
+    enum class Support
+    {
+        point,
+        domain
+    };
+    friend constexpr auto names(Support) { return choice_names<Support>({{Support::point, "point"}, {Support::domain, "domain"}}); }
+    enum class Convection
+    {
+        upwind,
+        central,
+        two_sided,
+        none
+    };
+    friend constexpr auto names(Convection)
+    {
+        return choice_names<Convection>({{Convection::upwind, "upwind"},
+                                         {Convection::central, "central"},
+                                         {Convection::two_sided, "two_sided"},
+                                         {Convection::none, "none"}});
+    }
+    enum class Frontier
+    {
+        extrapolate,
+        literal,
+        arrival
+    };
+    friend constexpr auto names(Frontier)
+    {
+        return choice_names<Frontier>(
+            {{Frontier::extrapolate, "extrapolate"}, {Frontier::literal, "literal"}, {Frontier::arrival, "arrival"}});
+    }
+
+    Support support = Support::domain;
+    Convection convection = Convection::two_sided;
+    Frontier frontier = Frontier::arrival;
+    double hourglass = 0.05, volume_cap = 0;
+
+    template <class V>
+    void describe(V& v)
+    {
+        v.choice("support", support, "point: a point belongs to one cell; domain: its box spreads over the cells that it overlaps");
+        v.choice(
+            "convection", convection,
+            "form of eq. (13); two_sided: central, from the next layer of cells where one side has no material, half of it before and half "
+            "after the forces, strain and position at the middle of the step");
+        v.choice(
+            "frontier", frontier,
+            "velocity of nodes reached for the first time: mean of neighbours, or zero; arrival: whenever mass arrives at a free face, "
+            "it brings its velocity");
+        v.optional("hourglass", hourglass, "-", "coefficient chi of the viscous hourglass force, at most 0.5; 0 leaves it out");
+        v.optional(
+            "volume_cap", volume_cap, "-",
+            "support = \"point\": stress counts over at most this many times a point's initial volume: one alone in its cell, grown by "
+            "tension, has more stiffness than mass; 0 sets no limit");
+    }
+};
+}  // namespace testbed

@@ -1,0 +1,13 @@
+#include "fem_reference/method.hpp"
+#include "lpfdm/lpfdm.hpp"
+#include "mpm/mpm.hpp"
+
+namespace testbed
+{
+/// All methods, as scenes know them: nothing is run here.
+const std::vector<Method>& methods()
+{
+    static const std::vector<Method> rows{lpfdm_method(), mpm_method(), fem_method()};
+    return rows;
+}
+}  // namespace testbed
