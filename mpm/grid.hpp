@@ -14,7 +14,7 @@ template <class Shape>
 struct MpmGrid
 {
     static constexpr int S = Shape::S;
-    static constexpr bool reaches_beyond = std::is_same_v<Shape, BSplineShape>;  ///< the lattice's edge
+    static constexpr bool reaches_beyond = Shape::reaches_beyond;  ///< the lattice's edge
 
     Lattice lattice;
     Nodes nodes;

@@ -6,7 +6,6 @@
 #include "core/bodies/support.hpp"
 #include "core/lattice/gather.hpp"
 #include "core/lattice/kinematics.hpp"
-#include "mpm/shape.hpp"
 
 namespace testbed
 {
@@ -78,7 +77,7 @@ public:
     template <class Shape>
     Slopes slopes(double scale) const
     {
-        static_assert(std::is_same_v<Shape, LinearShape>);
+        static_assert(!Shape::is_smooth);
         const double all = sum(volume_);
         const ShapeAt<Shape> at({Pack(sum(ax_) / all), Pack(sum(ay_) / all), Pack(0.0), Pack(0.0)}, scale);
         Slopes s;

@@ -1,6 +1,6 @@
 #include "core/lattice/gather.hpp"
 #include "lpfdm/equations.hpp"
-#include "mpm/shape.hpp"
+#include "mpm/shapes/bspline.hpp"
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>

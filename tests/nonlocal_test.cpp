@@ -1,5 +1,7 @@
 #include "core/bodies/nonlocal.hpp"
-#include "mpm/shape.hpp"
+#include "mpm/shapes/bspline.hpp"
+#include "mpm/shapes/cpgimp.hpp"
+#include "mpm/shapes/linear.hpp"
 #include "tests/scenes.hpp"
 
 #include <gtest/gtest.h>

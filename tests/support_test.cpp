@@ -1,5 +1,7 @@
 #include "core/bodies/support.hpp"
-#include "mpm/shape.hpp"
+#include "mpm/shapes/bspline.hpp"
+#include "mpm/shapes/cpgimp.hpp"
+#include "mpm/shapes/linear.hpp"
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>

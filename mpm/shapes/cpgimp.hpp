@@ -6,31 +6,14 @@
 
 namespace testbed
 {
-/// Bilinear, evaluated at the point (Sulsky, Chen & Schreyer 1994).
-struct LinearShape
-{
-    static constexpr int S = 2;
-    static constexpr bool has_box = false;
-    static constexpr double half_width = 0;
-
-    template <class T>
-    TESTBED_INLINE static std::array<T, S> weights(T a, T)
-    {
-        return {T(1.0) - a, a};
-    }
-    template <class T>
-    TESTBED_INLINE static std::array<T, S> slopes(T, T)
-    {
-        return {T(-1.0), T(1.0)};
-    }
-};
-
 /// Mean of the linear shape function and of its slope over the point's box (Bardenhagen & Kober 2004); the box stretches
 /// with the point, so that neighbours stay contiguous (cpGIMP).
 struct GimpShape
 {
     static constexpr int S = 3;
     static constexpr bool has_box = true;
+    static constexpr bool is_smooth = true;        ///< slopes do not jump at lines of nodes
+    static constexpr bool reaches_beyond = false;  ///< the edge of the lattice
 
     template <class T>
     TESTBED_INLINE static std::array<T, S> weights(T a, T width)
@@ -54,27 +37,6 @@ struct GimpShape
     {
         const T second = above(a + width - T(1.0), bin_tolerance) * inverse, first = T(1.0) - second;
         return {-first, first - second, second};
-    }
-};
-
-/// Quadratic B-spline about each node, evaluated at the point (Steffen, Kirby & Berzins 2008). At the edge of the lattice see
-/// LatticeEdges.
-struct BSplineShape
-{
-    static constexpr int S = 3;
-    static constexpr bool has_box = false;
-    static constexpr double half_width = 0.5;
-
-    template <class T>
-    TESTBED_INLINE static std::array<T, S> weights(T a, T)
-    {
-        const T low = T(0.5) * (T(1.0) - a) * (T(1.0) - a), high = T(0.5) * a * a;
-        return {low, T(1.0) - low - high, high};
-    }
-    template <class T>
-    TESTBED_INLINE static std::array<T, S> slopes(T a, T)
-    {
-        return {a - T(1.0), T(1.0) - T(2.0) * a, a};
     }
 };
 }  // namespace testbed
