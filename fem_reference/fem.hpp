@@ -25,7 +25,7 @@ public:
     std::size_t bytes() const override;
     const PhaseTimer& timer() const override { return timer_; }
     std::vector<RestraintRecord> restraints() const override { return elasticity_.restraints(displacement_, time_); }
-    const char* kinematics() const override { return "small_strain"; }
+    Kinematics kinematics() const override { return Kinematics::small_strain; }
     void write_state(StateWriter& writer) override { state(writer); }
     void read_state(StateReader& reader) override { state(reader); }
     /// The limit of a cell as large as the distance of nodes, without damping.

@@ -27,8 +27,8 @@ public:
         Pack v = lanes.keep(volume<Support>(q, p, lanes));
         if constexpr (S == 1)
             v = min(v, Pack(body.counted_volume));
-        const Pack pressure(body.confinement);
-        const Pack xx = v * (lanes.load(&q.sxx[p]) + pressure), yy = v * (lanes.load(&q.syy[p]) + pressure), xy = v * lanes.load(&q.sxy[p]);
+        const SymTensor<Pack> s = total_stress(body, p, lanes);
+        const Pack xx = v * s.xx, yy = v * s.yy, xy = v * s.xy;
         if constexpr (S == 1)
         {
             total_[1] += xx;

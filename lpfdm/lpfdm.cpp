@@ -33,7 +33,7 @@ public:
         for (Body& body : bodies_)
         {
             const Points& q = body.points;
-            wave_speed_ = std::max(wave_speed_, std::sqrt(moduli(body.material).constrained() * q.initial_volume / q.mass));
+            wave_speed_ = std::max(wave_speed_, wave_speed(body.material, q));
             if (options_.volume_cap > 0)
                 body.counted_volume = options_.volume_cap * q.initial_volume;
         }

@@ -162,9 +162,10 @@ public:
         if constexpr (what != Scatter::momentum)
         {
             const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
-            txx = v * (lanes.load(&q.sxx[p]) + Pack(body.confinement));
-            tyy = v * (lanes.load(&q.syy[p]) + Pack(body.confinement));
-            txy = v * lanes.load(&q.sxy[p]);
+            const SymTensor<Pack> s = total_stress(body, p, lanes);
+            txx = v * s.xx;
+            tyy = v * s.yy;
+            txy = v * s.xy;
             if constexpr (Strain::averaged)
             {
                 const Pack mean = Pack(0.5) * (txx + tyy);

@@ -1,8 +1,13 @@
 #include "core/run/guards.hpp"
 #include "core/run/run.hpp"
 #include "fem_reference/fem.hpp"
+#include "tests/quadrilateral.hpp"
 
 #include <cmath>
+#include <deal.II/dofs/dof_handler.h>
+#include <deal.II/fe/fe_q.h>
+#include <deal.II/fe/fe_values.h>
+#include <deal.II/grid/grid_generator.h>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
@@ -605,4 +610,30 @@ TEST(FemScene, RunWritesAFile)
     std::filesystem::remove_all(folder);
 }
 }  // namespace
+
+/// The point function of Mohr-Coulomb at the quadrature points of a bilinear element: the same strength as in a cell of particles.
+TEST(PointFunction, ServesQuadraturePoints)
+{
+    dealii::Triangulation<2> mesh;
+    dealii::GridGenerator::hyper_cube(mesh);
+    const dealii::FE_Q<2> element(1);
+    dealii::DoFHandler<2> dofs(mesh);
+    dofs.distribute_dofs(element);
+    dealii::FEValues<2> values(element, dealii::QGauss<2>(2), dealii::update_gradients | dealii::update_JxW_values);
+    values.reinit(dofs.begin_active());
+    std::vector<test::IntegrationPoint> points(values.n_quadrature_points);
+    constexpr std::array<unsigned int, 4> corner{0, 1, 3, 2};  // around the square
+    for (unsigned int q = 0; q < points.size(); ++q)
+        for (std::size_t n = 0; n < 4; ++n)
+        {
+            points[q].dx[n] = values.shape_grad(corner[n], q)[0];
+            points[q].dy[n] = values.shape_grad(corner[n], q)[1];
+            points[q].area = values.JxW(q);
+        }
+    const ElasticModuli moduli(5e7, 0.3);
+    constexpr double phi = 0.5, c = 9800;
+    const MohrCoulomb law{{moduli}, {c, std::sin(phi)}, {moduli, 0.0, std::numeric_limits<double>::infinity()}, {}};
+    const double strength = 2 * c * std::cos(phi) / (1 - std::sin(phi));
+    EXPECT_NEAR(test::pressure_on_top(law, points, 3 * strength * (1 - 0.09) / 5e7, 120), strength, 1e-3 * strength);
+}
 }  // namespace testbed

@@ -1,4 +1,5 @@
 #include "core/materials/material.hpp"
+#include "tests/quadrilateral.hpp"
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +17,7 @@ const double none = std::numeric_limits<double>::infinity();
 
 MohrCoulomb law_of(double friction, double cohesion, double dilatancy = 0, const Softening& softening = {}, double tension = none)
 {
-    return {soil, {cohesion, std::sin(friction)}, {soil, std::sin(dilatancy), tension}, softening};
+    return {{soil}, {cohesion, std::sin(friction)}, {soil, std::sin(dilatancy), tension}, softening};
 }
 
 /// D : e in principal directions, written out apart from the code under test.
@@ -47,7 +48,7 @@ double most_critical(const State& s, double friction, double cohesion)
 
 double energy(const State& s)
 {
-    return elastic_energy_density(soil, s.stress, s.stress_zz);
+    return ElasticPart{soil}.energy_density(s.stress, s.stress_zz);
 }
 }  // namespace
 
@@ -411,4 +412,16 @@ TEST(MohrCoulomb, BatchKeepsNaN)
         EXPECT_EQ(std::isfinite(q.sxy[p]), p > 0) << p;
         EXPECT_EQ(q.plastic_shear[p] > 0, p > 0) << p;
     }
+}
+
+/// The point function serves other hosts than points: a quadrilateral of FLAC bears 2 c cos(phi) / (1 - sin(phi)), and up to that what
+/// elasticity asks for in plane strain, E / (1 - nu^2) times the strain.
+TEST(MohrCoulomb, PointFunctionServesTriangles)
+{
+    const MohrCoulomb law = law_of(phi, c);
+    const auto triangles = test::triangles();
+    const double strength = 2 * c * std::cos(phi) / (1 - std::sin(phi));
+    const double modulus = soil.youngs_modulus() / (1 - soil.poissons_ratio() * soil.poissons_ratio());
+    EXPECT_NEAR(test::pressure_on_top(law, triangles, 0.5 * strength / modulus, 20), 0.5 * strength, 1e-3 * strength);
+    EXPECT_NEAR(test::pressure_on_top(law, triangles, 3 * strength / modulus, 120), strength, 1e-3 * strength);
 }

@@ -74,8 +74,8 @@ std::string fields_and_modules(const Scene& scene, Solver& solver)
         modules.emplace_back("body force expression");
     if (!scene.probes.empty())
         modules.push_back(fmt::format("{} probes", scene.probes.size()));
-    if (scene.exact.count(solver.kinematics()))
-        modules.push_back(fmt::format("exact solution ({})", solver.kinematics()));
+    if (scene.exact.count(name_of(solver.kinematics())))
+        modules.push_back(fmt::format("exact solution ({})", name_of(solver.kinematics())));
     return fmt::format("fields           {}\nmodules          {}\n", fmt::join(fields, ", "), fmt::join(modules, ", "));
 }
 

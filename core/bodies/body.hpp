@@ -31,6 +31,15 @@ struct Body
     }
 };
 
+/// What makes forces at the points [p, p + lanes) [Pa]: their stress beyond the confining pressure. The one place that puts it together.
+template <class Lanes>
+TESTBED_INLINE SymTensor<Pack> total_stress(const Body& body, std::size_t p, const Lanes& lanes)
+{
+    const Points& q = body.points;
+    const Pack pressure(body.confinement);
+    return {lanes.load(&q.sxx[p]) + pressure, lanes.load(&q.syy[p]) + pressure, lanes.load(&q.sxy[p])};
+}
+
 /// What a method asks of each point beyond position and stress.
 struct PointNeeds
 {

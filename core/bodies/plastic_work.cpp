@@ -7,28 +7,19 @@ namespace testbed
 {
 namespace
 {
-double sin_psi(const Material& material)
+double plastic_work_per_shear(const Body& body, std::size_t p)
 {
     return std::visit(
-        [](const auto& law)
+        [&](const auto& law)
         {
-            if constexpr (std::is_base_of_v<MohrCoulomb, std::remove_cvref_t<decltype(law)>>)
-                return law.back.sin_psi();
+            if constexpr (requires { law.plastic_work_per_shear(body.points, p); })
+                return law.plastic_work_per_shear(body.points, p);
             else
                 return 0.0;
         },
-        material);
+        body.material);
 }
 }  // namespace
-
-double plastic_work_per_shear(const Body& body, std::size_t p)
-{
-    const Points& q = body.points;
-    const double mean = 0.5 * (q.sxx[p] + q.syy[p]), radius = std::hypot(0.5 * (q.sxx[p] - q.syy[p]), q.sxy[p]);
-    const double szz = out_of_plane_stress(moduli(body.material), q, p);
-    const double major = std::max(mean + radius, szz), minor = std::min(mean - radius, szz), sine = sin_psi(body.material);
-    return 0.5 * (major * (1 + sine) - minor * (1 - sine));
-}
 
 double PlasticWork::add(const std::vector<Body>& bodies)
 {

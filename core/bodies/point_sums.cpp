@@ -18,18 +18,14 @@ double work_over_energy(double volume_ratio)
     return 2 * (a - 1 + 1 / volume_ratio) / (a * a);
 }
 
-double strain_energy(const Points& q, const ElasticModuli& base, std::size_t p)
-{
-    const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
-    return q.current_volume(p) * elastic_energy_density(base, {q.sxx[p], q.syy[p], q.sxy[p]}, out_of_plane_stress(base, q, p)) / softer;
-}
-
 double strain_energy(const std::vector<Body>& bodies)
 {
     double total = 0;
     for (const Body& body : bodies)
-        total += ordered_sum<1>(body.points.count, [&, base = moduli(body.material)](std::size_t p)
-                                { return std::array{strain_energy(body.points, base, p)}; })[0];
+        total += std::visit(
+            [&](const auto& law)
+            { return ordered_sum<1>(body.points.count, [&](std::size_t p) { return std::array{strain_energy(law, body.points, p)}; })[0]; },
+            body.material);
     return total;
 }
 
@@ -40,18 +36,16 @@ PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice)
     for (const Body& body : bodies)
     {
         const Points& q = body.points;
-        const ElasticModuli base = moduli(body.material);
         const double initial = 1 / q.initial_volume, mass = q.mass * q.weight_share;
-        const auto s = ordered_sum<6>(q.count,
-                                      [&](std::size_t p)
-                                      {
-                                          const double volume = q.current_volume(p), energy = strain_energy(q, base, p);
-                                          const bool inside =
-                                              q.x[p] >= low[0] && q.x[p] <= high[0] && q.y[p] >= low[1] && q.y[p] <= high[1];
-                                          return std::array<double, 6>{energy,        energy * work_over_energy(volume * initial),
-                                                                       volume,        mass * q.x[p],
-                                                                       mass * q.y[p], inside ? 0.0 : 1.0};
-                                      });
+        const auto of_point = [&](const auto& law, std::size_t p)
+        {
+            const double volume = q.current_volume(p), energy = strain_energy(law, q, p);
+            const bool inside = q.x[p] >= low[0] && q.x[p] <= high[0] && q.y[p] >= low[1] && q.y[p] <= high[1];
+            return std::array<double, 6>{
+                energy, energy * work_over_energy(volume * initial), volume, mass * q.x[p], mass * q.y[p], inside ? 0.0 : 1.0};
+        };
+        const auto s = std::visit([&](const auto& law) { return ordered_sum<6>(q.count, [&](std::size_t p) { return of_point(law, p); }); },
+                                  body.material);
         total.strain_energy += s[0];
         total.elastic_work += s[1];
         total.volume += s[2];

@@ -19,8 +19,7 @@ struct PointSums
     double outside = 0;                                                      ///< points that are not on the lattice
 };
 
-/// Energy of the stress on the current volume of a point, and of all points [J/m].
-double strain_energy(const Points& q, const ElasticModuli& base, std::size_t p);
+/// Energy of the stress of all points on their current volume [J/m].
 double strain_energy(const std::vector<Body>& bodies);
 PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice);
 

@@ -5,6 +5,7 @@
 
 #include "core/base/types.hpp"
 #include "core/lattice/points.hpp"
+#include "core/materials/kinematics.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -45,19 +46,26 @@ inline double stiffness_ratio(const Points& q, std::size_t p)
     return q.stiffness.active() ? q.stiffness[p] : 1.0;
 }
 
-/// Out-of-plane stress of point p [Pa]: that of the law, if it keeps one, else the elastic one.
-inline double out_of_plane_stress(const ElasticModuli& m, const Points& q, std::size_t p)
+/// What a law with an isotropic elastic part owns beside its stress update.
+struct ElasticPart
 {
-    return q.szz.active() ? q.szz[p] : m.poissons_ratio() * (q.sxx[p] + q.syy[p]);
-}
+    static constexpr Kinematics kinematics = Kinematics::hypoelastic;
+    ElasticModuli moduli;
 
-/// Elastic energy per volume of a stress with out-of-plane component szz [Pa].
-inline double elastic_energy_density(const ElasticModuli& m, const SymTensor<>& s, double szz)
-{
-    const double normal = s.xx * s.xx + s.yy * s.yy + szz * szz;
-    const double mixed = s.xx * s.yy + (s.xx + s.yy) * szz;
-    return (normal - 2 * m.poissons_ratio() * mixed) / (2 * m.youngs_modulus()) + s.xy * s.xy / (2 * m.shear());
-}
+    /// Of compression, at the stiffest point [m/s].
+    double wave_speed(const Points& q) const { return std::sqrt(moduli.constrained() * q.initial_volume / q.mass); }
+
+    /// That is given back, per current volume, of a stress with out-of-plane component szz at a point with the stiffness of the law
+    /// [J/m^3].
+    double energy_density(const SymTensor<>& s, double szz) const
+    {
+        const double normal = s.xx * s.xx + s.yy * s.yy + szz * szz;
+        const double mixed = s.xx * s.yy + (s.xx + s.yy) * szz;
+        return (normal - 2 * moduli.poissons_ratio() * mixed) / (2 * moduli.youngs_modulus()) + s.xy * s.xy / (2 * moduli.shear());
+    }
+    /// Of a stress in the plane that is all elastic [Pa].
+    double elastic_out_of_plane_stress(const SymTensor<>& s) const { return moduli.poissons_ratio() * (s.xx + s.yy); }
+};
 
 struct NoRotation
 {
@@ -100,10 +108,8 @@ struct ExactRotation
 };
 
 template <class Rotation>
-struct Hypoelastic
+struct Hypoelastic : ElasticPart
 {
-    ElasticModuli moduli;
-
     template <class T>
     struct State
     {
@@ -112,6 +118,7 @@ struct Hypoelastic
 
     /// The fields of a point beyond its stress in the plane: none.
     void allocate(Points&) const {}
+    double out_of_plane_stress(const Points& q, std::size_t p) const { return elastic_out_of_plane_stress({q.sxx[p], q.syy[p], q.sxy[p]}); }
 
     /// The pure point function: stress after the displacement gradient increment d.
     template <class T>

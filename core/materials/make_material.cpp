@@ -8,8 +8,8 @@ template <class Law>
 Material elastic(const ElasticModuli& moduli, bool varies)
 {
     if (varies)
-        return VaryingStiffness<Law>{{moduli}};
-    return Law{moduli};
+        return VaryingStiffness<Law>{{{{moduli}}}};
+    return Law{{moduli}};
 }
 
 Softening make_softening(const SofteningSpec& spec, double cell_size)
@@ -23,7 +23,7 @@ Softening make_softening(const SofteningSpec& spec, double cell_size)
 Material mohr_coulomb(const MaterialSpec& spec, const ElasticModuli& moduli, const Strength<>& strength, double cell_size, bool varies)
 {
     const double tension = spec.strength->tensile_strength.value_or(std::numeric_limits<double>::infinity());
-    const MohrCoulomb law{moduli,
+    const MohrCoulomb law{{moduli},
                           strength,
                           {moduli, std::sin(spec.strength->dilatancy_angle), tension},
                           spec.softening ? make_softening(*spec.softening, cell_size) : Softening{}};

@@ -12,7 +12,8 @@ using Material = std::variant<LinearElastic, HypoelasticJaumann, HypoelasticExac
                               VaryingStiffness<HypoelasticJaumann>, VaryingStiffness<HypoelasticExactRotation>, MohrCoulomb,
                               MohrCoulombField<true, false>, MohrCoulombField<false, true>, MohrCoulombField<true, true>>;
 
-/// What a law must offer: a pure point function (FEM quadrature calls it, too) and its batch form.
+/// What a law must offer: a pure point function (FEM quadrature and constant-strain triangles call it, too), its batch form, and what only
+/// the law knows of itself: energy, wave speed, out-of-plane stress, kinematics.
 template <class Law>
 concept MaterialLaw = requires(const Law law, typename Law::template State<double> state, Points points, Gradient<double> d,
                                Gradient<Pack> packs)
@@ -20,6 +21,18 @@ concept MaterialLaw = requires(const Law law, typename Law::template State<doubl
     {
         law.moduli
         } -> std::convertible_to<ElasticModuli>;
+    {
+        Law::kinematics
+        } -> std::convertible_to<Kinematics>;
+    {
+        law.wave_speed(points)
+        } -> std::same_as<double>;
+    {
+        law.energy_density(SymTensor<>{}, 0.0)
+        } -> std::same_as<double>;
+    {
+        law.out_of_plane_stress(points, std::size_t{})
+        } -> std::same_as<double>;
     law.allocate(points);
     law.update(state, d);
     law.update(points, std::size_t{}, AllLanes{}, packs);
@@ -29,5 +42,29 @@ static_assert(MaterialLaw<LinearElastic> && MaterialLaw<VaryingStiffness<Hypoela
 inline const ElasticModuli& moduli(const Material& material)
 {
     return std::visit([](const auto& law) -> const ElasticModuli& { return law.moduli; }, material);
+}
+inline Kinematics kinematics(const Material& material)
+{
+    return std::visit([](const auto& law) { return law.kinematics; }, material);
+}
+/// Of compression in these points, the stiffest of them [m/s].
+inline double wave_speed(const Material& material, const Points& q)
+{
+    return std::visit([&](const auto& law) { return law.wave_speed(q); }, material);
+}
+/// Of point p [Pa].
+inline double out_of_plane_stress(const Material& material, const Points& q, std::size_t p)
+{
+    return std::visit([&](const auto& law) { return law.out_of_plane_stress(q, p); }, material);
+}
+/// Energy of the stress of point p on its current volume, that is given back [J/m].
+template <MaterialLaw Law>
+double strain_energy(const Law& law, const Points& q, std::size_t p)
+{
+    return q.current_volume(p) * law.energy_density({q.sxx[p], q.syy[p], q.sxy[p]}, law.out_of_plane_stress(q, p)) / stiffness_ratio(q, p);
+}
+inline double strain_energy(const Material& material, const Points& q, std::size_t p)
+{
+    return std::visit([&](const auto& law) { return strain_energy(law, q, p); }, material);
 }
 }  // namespace testbed

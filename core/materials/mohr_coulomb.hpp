@@ -21,9 +21,8 @@ struct Strength
 };
 
 /// The law with one strength for all points of the body, and softening by the point's own plastic shear strain.
-struct MohrCoulomb
+struct MohrCoulomb : ElasticPart
 {
-    ElasticModuli moduli;
     Strength<> strength{0, 0};
     MohrCoulombReturn back;
     Softening softening;
@@ -39,6 +38,15 @@ struct MohrCoulomb
     {
         q.szz.activate(q.count);
         q.plastic_shear.activate(q.count);
+    }
+    double out_of_plane_stress(const Points& q, std::size_t p) const { return q.szz[p]; }
+
+    /// What is lost per volume and unit of plastic shear strain, along the flow of the face that the stress of point p lies on [J/m^3].
+    double plastic_work_per_shear(const Points& q, std::size_t p) const
+    {
+        const double mean = 0.5 * (q.sxx[p] + q.syy[p]), radius = std::hypot(0.5 * (q.sxx[p] - q.syy[p]), q.sxy[p]);
+        const double major = std::max(mean + radius, q.szz[p]), minor = std::min(mean - radius, q.szz[p]), sine = back.sin_psi();
+        return 0.5 * (major * (1 + sine) - minor * (1 - sine));
     }
 
     /// The pure point function: stress after the displacement gradient increment d, with the law's one strength and softening by
@@ -83,7 +91,7 @@ protected:
     TESTBED_INLINE void elastic(State<T>& state, const Gradient<T>& d) const
     {
         HypoelasticExactRotation::State<T> in_plane{state.stress};
-        HypoelasticExactRotation{moduli}.update(in_plane, d);
+        HypoelasticExactRotation{{moduli}}.update(in_plane, d);
         state.stress = in_plane.stress;
         state.stress_zz += T(moduli.lame()) * d.trace();
     }

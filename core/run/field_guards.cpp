@@ -156,7 +156,7 @@ private:
             for (std::size_t p = 0; p < body.points.count; ++p)
             {
                 const Points& q = body.points;
-                const double energy = strain_energy(q, moduli(body.material), p);
+                const double energy = strain_energy(body.material, q, p);
                 sum += energy * std::abs(q.current_volume(p) / q.initial_volume - 1);
                 weight += energy;
             }

@@ -131,7 +131,7 @@ public:
                                              [&](std::size_t p)
                                              {
                                                  const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
-                                                 const double szz = out_of_plane_stress(m, q, p);
+                                                 const double szz = out_of_plane_stress(body.material, q, p);
                                                  const double mean = m.poissons_ratio() * (q.sxx[p] + q.syy[p] + szz);
                                                  const double a = (1 + m.poissons_ratio()) * q.sxx[p] - mean,
                                                               b = (1 + m.poissons_ratio()) * q.syy[p] - mean,
@@ -191,7 +191,7 @@ bool is_to_rest(const Scene& scene)
 
 Guards::Guards(const Scene& scene, const Solver& solver, double dt_critical)
 {
-    const bool small_strain = std::string(solver.kinematics()) == "small_strain";
+    const bool small_strain = solver.kinematics() == Kinematics::small_strain;
     if (is_to_rest(scene) && !solver.is_static())
         guards_.push_back(std::make_unique<RestGuard>(scene.time.end));
     const auto add = [&](auto&& guards) { std::move(guards.begin(), guards.end(), std::back_inserter(guards_)); };

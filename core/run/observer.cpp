@@ -14,7 +14,7 @@ Observer::Observer(const Scene& scene, const Solver& solver)
       ledger_(scene.may_flow(), scene.confinement ? scene.confinement->pressure : 0)
 {
     const Constants constants = scene.expression_constants();
-    if (const auto found = scene.exact.find(solver.kinematics()); found != scene.exact.end())
+    if (const auto found = scene.exact.find(name_of(solver.kinematics())); found != scene.exact.end())
     {
         if (found->second.displacement)
             for (const auto& text : *found->second.displacement)
@@ -74,7 +74,7 @@ std::array<double, 6> Observer::stress(const Location& at) const
 {
     const Body& body = solver_.bodies()[at.body];
     const Points& q = body.points;
-    return {q.sxx[at.point], q.sxy[at.point], 0, q.syy[at.point], 0, out_of_plane_stress(moduli(body.material), q, at.point)};
+    return {q.sxx[at.point], q.sxy[at.point], 0, q.syy[at.point], 0, out_of_plane_stress(body.material, q, at.point)};
 }
 
 std::array<double, 6> Observer::exact_stress(const Place& at) const

@@ -93,7 +93,7 @@ void write_header(ResultFile& file, const Scene& scene, const Solver& solver)
     file.attribute("/", "title", scene.title);
     file.attribute("/", "method", method_of(scene).name);
     file.attribute("/", "variant", variant_label(scene));
-    file.attribute("/", "kinematics", std::string(solver.kinematics()));
+    file.attribute("/", "kinematics", name_of(solver.kinematics()));
     file.attribute("/scene", "resolved", resolved_toml(scene));
     file.attribute("/scene", "cell_size", scene.grid.cell_size);
     file.attribute("/scene", "cell_origin", std::span<const double>(scene.grid.origin));

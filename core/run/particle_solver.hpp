@@ -17,7 +17,7 @@ public:
     const PhaseTimer& timer() const final { return timer_; }
     std::vector<RestraintRecord> restraints() const final { return node_ops_.records(); }
     NodalWork* work_done() final { return &node_ops_.work_done(); }
-    const char* kinematics() const final { return "hypoelastic"; }
+    Kinematics kinematics() const final { return testbed::kinematics(bodies_.front().material); }
 
 protected:
     static constexpr int S = Support::S;

@@ -124,7 +124,7 @@ public:
     virtual const PhaseTimer& timer() const = 0;
     /// Supports and walls at the last prepare().
     virtual std::vector<RestraintRecord> restraints() const = 0;
-    virtual const char* kinematics() const = 0;  ///< which [exact.*] applies
+    virtual Kinematics kinematics() const = 0;  ///< which [exact.*] applies
     /// What limits the coming step, in the present state and on the safe side; nothing for an implicit method.
     virtual std::vector<StepLimit> step_limits() { return {}; }
     /// The limit of small motions about the present state, without a safe side, from the largest eigenvalue of its own stiffness; takes the

@@ -80,7 +80,7 @@ private:
     bool is_compact_ = true;
 };
 
-/// f(body, point, its stress less the average about it, the out-of-plane part of that) for elastic bodies.
+/// f(body, point, its stress less the average about it).
 template <class F>
 void for_each_unresolved(const std::vector<Body>& bodies, const Lattice& lattice, double cell_size, F&& f)
 {
@@ -93,8 +93,13 @@ void for_each_unresolved(const std::vector<Body>& bodies, const Lattice& lattice
         const auto rest = [&](const Field<double>& s) { return average.difference([&](std::size_t p) { return s[p]; }); };
         const auto sxx = rest(q.sxx), syy = rest(q.syy), sxy = rest(q.sxy);
         for (std::size_t p = 0; p < q.count; ++p)
-            f(body, p, SymTensor<>{sxx[p], syy[p], sxy[p]}, moduli(body.material).poissons_ratio() * (sxx[p] + syy[p]));
+            f(body, p, SymTensor<>{sxx[p], syy[p], sxy[p]});
     }
+}
+/// The part of a change of stress that follows from those in the plane.
+double elastic_szz(const Body& body, const SymTensor<>& r)
+{
+    return std::visit([&](const auto& law) { return law.elastic_out_of_plane_stress(r); }, body.material);
 }
 }  // namespace
 
@@ -103,12 +108,12 @@ double stress_error(const std::vector<Body>& bodies, const Lattice& lattice, dou
     const auto square = [](double xx, double yy, double zz, double xy) { return xx * xx + yy * yy + zz * zz + 2 * xy * xy; };
     double all = 0, rest = 0;
     for_each_unresolved(bodies, lattice, cell_size,
-                        [&](const Body& body, std::size_t p, const SymTensor<>& r, double szz)
+                        [&](const Body& body, std::size_t p, const SymTensor<>& r)
                         {
                             const Points& q = body.points;
                             const double V = q.current_volume(p);
-                            all += V * square(q.sxx[p], q.syy[p], out_of_plane_stress(moduli(body.material), q, p), q.sxy[p]);
-                            rest += V * square(r.xx, r.yy, szz, r.xy);
+                            all += V * square(q.sxx[p], q.syy[p], out_of_plane_stress(body.material, q, p), q.sxy[p]);
+                            rest += V * square(r.xx, r.yy, elastic_szz(body, r), r.xy);
                         });
     return all > 0 ? std::sqrt(rest / all) : 0;
 }
@@ -118,10 +123,11 @@ double unresolved_energy(const std::vector<Body>& bodies, const Lattice& lattice
 {
     double total = 0;
     for_each_unresolved(bodies, lattice, cell_size,
-                        [&](const Body& body, std::size_t p, const SymTensor<>& r, double szz)
+                        [&](const Body& body, std::size_t p, const SymTensor<>& r)
                         {
-                            const double softer = body.points.stiffness.active() ? body.points.stiffness[p] : 1.0;
-                            total += body.points.current_volume(p) * elastic_energy_density(moduli(body.material), r, szz) / softer;
+                            const double density =
+                                std::visit([&](const auto& law) { return law.energy_density(r, elastic_szz(body, r)); }, body.material);
+                            total += body.points.current_volume(p) * density / stiffness_ratio(body.points, p);
                         });
     for (std::size_t b = 0; b < bodies.size(); ++b)
         if (const NodeAverage average(bodies[b].points, lattice.origin, cell_size); average.is_compact())

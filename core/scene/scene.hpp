@@ -2,6 +2,7 @@
 /// A scene: what is computed, with which method. The describe() of each struct is at once the parser, the strict check of keys,
 /// `testbed doc` and the writer of the resolved scene.
 
+#include "core/materials/kinematics.hpp"
 #include "core/materials/material_spec.hpp"
 #include "core/scene/method.hpp"
 #include "core/scene/tables.hpp"
@@ -58,7 +59,7 @@ struct Scene
         v.table("confinement", confinement, "cell pressure of a compression test");
         v.table("body_force", body_force, "acceleration field, for manufactured solutions");
         v.list("probe", probes, "means over chosen points in the history");
-        v.tables("exact", exact, {"small_strain", "hypoelastic"}, "exact solution for methods that integrate this law");
+        v.tables("exact", exact, names_of<Kinematics>(), "exact solution for methods that integrate this law");
         v.table("output", output, "what is written");
         v.table("report", report, "what is graded");
         for (std::size_t m = 0; m < method_options.size(); ++m)
