@@ -43,7 +43,7 @@ public:
 
     void do_prepare(const Step& step) override
     {
-        node_ops_.begin_step(step.t, step.dt);
+        node_ops_.begin_step(step);
         bool others = false;  // cells and nodes in use
         if (cloud_.has_moved())
             timer_("bins", [&] { others = rebuild(); });
@@ -72,7 +72,7 @@ public:
                        const double power = resist_hourglass(grid_, hourglass_rate(), hourglass_x_, hourglass_y_);
                        node_ops_.note_hourglass((1 - 2 * hourglass_rate() * step.kick()) * power);  // half of the decay is then done
                    });
-        this->apply_loads("node operations (11)(15)", grid_.lattice, nodes_, step.t);
+        this->apply_loads("node operations (11)(15)", grid_.lattice, nodes_, step);
     }
 
     void do_advance(const Step& step) override
@@ -103,7 +103,7 @@ public:
                        mid_steps_.find(grid_, increment_.theta, dt);
                });
         timer_("points (6), material", [&] { move_all_points(dt); });
-        node_ops_.end_step(dt);
+        node_ops_.end_step(step);
     }
 
     MotionSums sums() const override { return nodal_sums(grid_.lattice, nodes_, this->lag(), this->internal_); }

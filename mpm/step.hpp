@@ -32,7 +32,7 @@ public:
 
     void do_prepare(const Step& step) override
     {
-        node_ops_.begin_step(step.t, step.dt);
+        node_ops_.begin_step(step);
         if (cloud_.has_moved())
             timer_("bins", [&] { rebuild(); });
         if (cloud_.nonlocal)
@@ -51,7 +51,7 @@ public:
                        restrain_mapped_velocity();
                    });
         grid_.gather_forces();
-        this->apply_loads("node operations", grid_.lattice, nodes_, step.t);
+        this->apply_loads("node operations", grid_.lattice, nodes_, step);
     }
 
     void do_advance(const Step& step) override
@@ -88,7 +88,7 @@ public:
         }
         if (xpic_)
             timer_("xpic", [&] { move_by_filter(dt); });
-        node_ops_.end_step(dt);
+        node_ops_.end_step(step);
     }
 
     /// The kinetic energy is that of the points: nodes see a part of it only. What they do not see moves no point, so that rest goes by

@@ -16,7 +16,7 @@ using namespace testbed;
 
 namespace
 {
-constexpr double wave_speed = 40;  ///< of the bodies here: M = 1.6e6 Pa, 1000 kg/m^3
+constexpr double bar_speed = 40;  ///< of the bodies here: M = 1.6e6 Pa, 1000 kg/m^3
 
 /// A free block of cells x cells on a lattice of unit cells with faces at (2 + shift, 2 + shift).
 std::string block(int cells, double poissons_ratio = 0.3, const std::string& more = "", double shift = 0, int points_per_cell = 2)
@@ -39,7 +39,7 @@ struct Case
     Case(const std::string& text, const std::string& method, const std::vector<std::string>& overrides = {}, int steps = 1)
         : scene(test::load(text, method, overrides)),
           solver(test::make(scene)),
-          dt(scene.time.dt.value_or(scene.time.cfl / wave_speed))
+          dt(scene.time.dt.value_or(scene.time.cfl / bar_speed))
     {
         for (int n = 0; n < steps; ++n, t += dt)
         {
@@ -123,7 +123,7 @@ TEST(Modes, HourglassControlDampsAtThePredictedRate)
         EXPECT_EQ(null.hourglass, 0u);
         EXPECT_EQ(null.deforming, 0u);
         EXPECT_EQ(null.rigid, 3u);
-        const double kept = 1 - 4 * chi * wave_speed * c.dt;
+        const double kept = 1 - 4 * chi * bar_speed * c.dt;
         int found = 0;
         for (const Mode& m : spectrum(map.matrix).modes)
             found += std::abs(m.eigenvalue - kept) < 1e-8;
@@ -181,7 +181,7 @@ TEST(Modes, CriticalStepOfACell)
     for (const double nu : {0.0, 0.3})
     {
         Case c(block(1, nu), "lpfdm-2000");
-        const double limit = std::sqrt(1 - nu) / wave_speed;
+        const double limit = std::sqrt(1 - nu) / bar_speed;
         EXPECT_LE(c.radius(0.999 * limit), 1 + 1e-8) << nu;
         EXPECT_GT(c.radius(1.001 * limit), 1.05) << nu;
         const auto found = critical_step([&](double dt) { return c.radius(dt); }, c.dt, 1e-6);
@@ -202,7 +202,7 @@ TEST(Modes, CriticalStepOfACell)
 TEST(Modes, PhaseOfTheLeapFrog)
 {
     Case c(block(1), "lpfdm-2000");
-    const double omega = 2 * wave_speed / std::sqrt(0.7), expected = 2 * std::asin(0.5 * omega * c.dt);
+    const double omega = 2 * bar_speed / std::sqrt(0.7), expected = 2 * std::asin(0.5 * omega * c.dt);
     bool found = false;
     for (const Mode& m : spectrum(c.map().matrix).modes)
     {
@@ -234,10 +234,10 @@ TEST(Modes, CentralConvectionIsUnstableAtATrailingFace)
             std::max_element(columns.begin(), columns.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
         return std::pair(s.radius, most->first);
     };
-    const auto [radius, column] = largest(0.1 * wave_speed, "central");
+    const auto [radius, column] = largest(0.1 * bar_speed, "central");
     EXPECT_GT(radius, 1.005);
     EXPECT_EQ(column, 2);
-    EXPECT_LT(largest(0.1 * wave_speed, "none").first, 1 + 1e-7);
+    EXPECT_LT(largest(0.1 * bar_speed, "none").first, 1 + 1e-7);
     EXPECT_LT(largest(0, "central").first, 1 + 1e-7);
 }
 
@@ -256,7 +256,7 @@ TEST(Modes, MapOverACell)
     for (const auto n : map.all(Unknown::Kind::velocity))
         EXPECT_NEAR(end[n], push[n], 1e-7);
     for (const auto n : map.all(Unknown::Kind::position))
-        EXPECT_NEAR(end[n], map.unknowns[static_cast<std::size_t>(n)].component * 20 * 0.0125 * wave_speed, 1e-6);
+        EXPECT_NEAR(end[n], map.unknowns[static_cast<std::size_t>(n)].component * 20 * 0.0125 * bar_speed, 1e-6);
     for (const auto n : map.all(Unknown::Kind::stress))
         EXPECT_NEAR(end[n], 0, 1e-7);
 }

@@ -38,8 +38,8 @@ struct Fixture
     }
     void step(double t, double dt)
     {
-        ops.begin_step(t, dt);
-        ops.end_step(dt);
+        ops.begin_step({t, dt, dt});
+        ops.end_step({0, dt, dt});
     }
     /// Velocity in y that the walls leave of 1 everywhere, at column i.
     std::vector<double> column(int i)
@@ -61,10 +61,10 @@ TEST(Wall, HandsOffAfterOneCell)
     f.step(0, 0.1);
     EXPECT_EQ(f.column(3), (std::vector<double>{1, 1, 1, 1, 1, 1, -2, -2, 1}));  // nodes at y = 3 and 3.5
     f.step(0.1, 0.1);
-    f.ops.begin_step(0.2, 0.1);  // travel 0.4 < L
+    f.ops.begin_step({0.2, 0.1, 0.1});  // travel 0.4 < L
     EXPECT_EQ(f.column(3), (std::vector<double>{1, 1, 1, 1, 1, 1, -2, -2, 1}));
-    f.ops.end_step(0.1);
-    f.ops.begin_step(0.3, 0.1);  // travel 0.6 > L
+    f.ops.end_step({0, 0.1, 0.1});
+    f.ops.begin_step({0.3, 0.1, 0.1});  // travel 0.6 > L
     EXPECT_EQ(f.column(3), (std::vector<double>{1, 1, 1, 1, 1, -2, -2, 1, 1}));
     EXPECT_DOUBLE_EQ((*f.ops.records()[0].displacement)[1], -2 * 0.3);
 }
@@ -76,7 +76,7 @@ TEST(Wall, SmoothFaceMovesWithTheWall)
     for (std::size_t n = 0; n < f.nodes.mass.size(); ++n)
         f.nodes.mass[n] = 1 + static_cast<double>(n % 3);
     f.step(0, 0.1);
-    f.ops.begin_step(0.1, 0.1);  // the faces are at y = 2.8 and 3.8
+    f.ops.begin_step({0.1, 0.1, 0.1});  // the faces are at y = 2.8 and 3.8
     const auto v = f.column(3);
     EXPECT_NEAR(0.4 * v[5] + 0.6 * v[6], -2, 1e-12);  // y = 2.5 and 3.0
     EXPECT_NEAR(0.4 * v[7] + 0.6 * v[8], -2, 1e-12);
@@ -87,13 +87,13 @@ TEST(Wall, SmoothFaceMovesWithTheWall)
 TEST(Wall, ReactionHoldsTheFace)
 {
     Fixture f("[[wall]]\nname = \"floor\"\nmin = [0.0, 0.2]\nmax = [4.0, 0.2]\nmotion = \"smooth\"\nfix = \"y\"\n");
-    f.ops.begin_step(0, 0.1);
+    f.ops.begin_step({0, 0.1, 0.1});
     const std::size_t low = f.lattice.node(3, 0), high = f.lattice.node(3, 1);
     f.nodes.mass[low] = 3;
     f.nodes.fy[low] = -5;
     f.nodes.fy[high] = -7;
     f.nodes.fx[low] = 4;
-    f.ops.apply_forces(f.lattice, f.nodes, 0);
+    f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
     EXPECT_NEAR(0.6 * f.nodes.fy[low] / 3 + 0.4 * f.nodes.fy[high] / 2, 0, 1e-12);
     EXPECT_NEAR(f.ops.records()[0].reaction[1], f.nodes.fy[low] + f.nodes.fy[high] + 12, 1e-12);
     EXPECT_GT(f.ops.records()[0].reaction[1], 0);
@@ -104,14 +104,14 @@ TEST(Wall, ReactionHoldsTheFace)
 TEST(Wall, ReactionBeforeDamping)
 {
     Fixture f("[damping]\nlocal = 0.8\n[[boundary]]\nname = \"base\"\nwhere = \"y <= 0\"\nfix = \"xy\"\n");
-    f.ops.begin_step(0, 0.1);
+    f.ops.begin_step({0, 0.1, 0.1});
     const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 0)), free = static_cast<std::uint32_t>(f.lattice.node(3, 2));
     f.nodes.set_active({n, free});
     f.nodes.fy[n] = -5;
     f.nodes.fx[n] = 2;
     f.nodes.vy[n] = f.nodes.vy[free] = 1;
     f.nodes.fy[free] = 10;
-    f.ops.apply_forces(f.lattice, f.nodes, 0);
+    f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
     EXPECT_EQ(f.ops.records()[0].reaction, (Vec2{-2, 5}));
     EXPECT_EQ(f.nodes.fy[n], 0);
     EXPECT_DOUBLE_EQ(f.nodes.fy[free], 2);
@@ -122,7 +122,7 @@ TEST(Wall, ReactionBeforeDamping)
 TEST(Wall, DampingDoesNotMoveTheFace)
 {
     Fixture f("[damping]\nlocal = 0.8\n[[wall]]\nname = \"floor\"\nmin = [0.0, 0.2]\nmax = [4.0, 0.2]\nmotion = \"smooth\"\nfix = \"y\"\n");
-    f.ops.begin_step(0, 0.1);
+    f.ops.begin_step({0, 0.1, 0.1});
     const auto low = static_cast<std::uint32_t>(f.lattice.node(3, 0)), high = static_cast<std::uint32_t>(f.lattice.node(3, 1));
     f.nodes.set_active({low, high});
     f.nodes.mass[low] = 3;
@@ -130,7 +130,7 @@ TEST(Wall, DampingDoesNotMoveTheFace)
     f.nodes.fy[high] = -7;
     f.nodes.vy[low] = 0.4;
     f.nodes.vy[high] = 0.6;
-    f.ops.apply_forces(f.lattice, f.nodes, 0);
+    f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
     EXPECT_NEAR(0.6 * f.nodes.fy[low] / 3 + 0.4 * f.nodes.fy[high] / 2, 0, 1e-12);
     EXPECT_GT(std::abs(f.nodes.fy[low]), 1e-3);  // the pair may still turn about the face
 }
@@ -147,7 +147,7 @@ TEST(Wall, HandsOffAtExactlyOneCell)
             f.step(0.05 * n, 0.05);  // 0.5 m in all: one cell
             EXPECT_EQ(f.column(3)[4], direction);
         }
-        f.ops.begin_step(0.5, 0.1);
+        f.ops.begin_step({0.5, 0.1, 0.1});
         EXPECT_EQ(f.column(3)[4], 1);
         EXPECT_EQ(f.column(3)[direction > 0 ? 5 : 3], 0);
     }
@@ -161,7 +161,7 @@ TEST(Wall, AGapPassesNothingOn)
         for (int i = 0; i <= f.lattice.nx; ++i)
             f.nodes.mass[f.lattice.node(i, j)] = 0;
     f.step(0, 0.1);
-    f.ops.begin_step(0.1, 0.1);  // the lower face is at y = 2.8, between a node with mass and one without
+    f.ops.begin_step({0.1, 0.1, 0.1});  // the lower face is at y = 2.8, between a node with mass and one without
     EXPECT_EQ(f.column(3)[5], 1);
 }
 
@@ -184,11 +184,12 @@ TEST(Wall, PullsSoilWhoseMassDoesNotReachTheNextNode)
             for (int i = 0; i <= f.lattice.nx; ++i)
                 f.nodes.mass[f.lattice.node(i, j)] = 0;
         f.step(0, 0.05);
-        f.ops.begin_step(0.05, 0.05);  // the face is at y = 2 + travel; points are 0.125 m apart, and the highest nodes with mass at y = 2
+        f.ops.begin_step(
+            {0.05, 0.05, 0.05});  // the face is at y = 2 + travel; points are 0.125 m apart, and the highest nodes with mass at y = 2
         EXPECT_EQ(f.column(3)[4], follows ? speed : 1.0) << method << " " << travel;
         const std::size_t n = f.lattice.node(3, 4);
         f.nodes.fy[n] = -5;
-        f.ops.apply_forces(f.lattice, f.nodes, 0);
+        f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
         EXPECT_EQ(f.nodes.fy[n], follows ? 0.0 : -5.0) << method << " " << travel;
         EXPECT_EQ(f.ops.records()[0].reaction[1], follows ? 5.0 : 0.0) << method << " " << travel;
     }
@@ -198,13 +199,13 @@ TEST(Wall, PullsSoilWhoseMassDoesNotReachTheNextNode)
 TEST(Wall, OwnsWhatItDrives)
 {
     Fixture f("[[boundary]]\nname = \"top\"\nwhere = \"y >= 3\"\nfix = \"y\"\n" + cap("hand_off"));
-    f.ops.begin_step(0, 0.1);
+    f.ops.begin_step({0, 0.1, 0.1});
     const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 6));
     f.nodes.set_active({n});
     for (int n_steps = 0; n_steps < 2; ++n_steps)  // reactions are those of the step
     {
         f.nodes.fy[n] = 5;
-        f.ops.apply_forces(f.lattice, f.nodes, 0);
+        f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
         EXPECT_EQ(f.ops.records()[0].reaction[1], 0);
         EXPECT_EQ(f.ops.records()[1].reaction[1], -5);
     }
@@ -217,9 +218,9 @@ TEST(Wall, LaterOnesDriveTheNodesWithin)
     const std::string block = "[[wall]]\nname = \"block\"\nmin = [0.0, 2.3]\nmax = [4.0, 3.8]\nmotion = \"smooth\"\nfix = \"y\"\n";
     const std::string plate = "[[wall]]\nname = \"plate\"\nmin = [0.0, 3.0]\nmax = [4.0, 3.0]\nfix = \"y\"\n";
     Fixture f(block + plate);
-    f.ops.begin_step(0, 0.1);
+    f.ops.begin_step({0, 0.1, 0.1});
     f.nodes.fy[f.lattice.node(3, 6)] = 5;
-    f.ops.apply_forces(f.lattice, f.nodes, 0);
+    f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
     EXPECT_EQ(f.ops.records()[0].reaction[1], 0);
     EXPECT_EQ(f.ops.records()[1].reaction[1], -5);
 }
@@ -237,7 +238,7 @@ TEST(Wall, LaterOnesDriveTheNodesOfAFace)
     for (const bool smooth_first : {true, false})
     {
         Fixture f(smooth_first ? smooth + plate : plate + smooth);
-        f.ops.begin_step(0, 0.1);
+        f.ops.begin_step({0, 0.1, 0.1});
         const auto v = f.column(3);
         if (smooth_first)
         {
@@ -249,7 +250,7 @@ TEST(Wall, LaterOnesDriveTheNodesOfAFace)
         const std::size_t low = f.lattice.node(3, 5), high = f.lattice.node(3, 6);
         f.nodes.fy[low] = -5;
         f.nodes.fy[high] = -7;
-        f.ops.apply_forces(f.lattice, f.nodes, 0);
+        f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
         const std::size_t first = smooth_first ? 0 : 1;
         EXPECT_NEAR(f.ops.records()[1 - first].reaction[1], 7, 1e-12);           // all of the node's force
         EXPECT_NEAR(f.ops.records()[first].reaction[1], 0.4 * 5 / 0.52, 1e-12);  // what then accelerates the face
@@ -276,9 +277,9 @@ TEST(Wall, DoorOpensWhenToldTo)
             values.push_back(vy[f.lattice.node(i, 0)]);
         return values;
     };
-    f.ops.begin_step(0.4, 0.1);
+    f.ops.begin_step({0.4, 0.1, 0.1});
     EXPECT_EQ(row(), std::vector<double>(9, 0.0));
-    f.ops.begin_step(0.5, 0.1);
+    f.ops.begin_step({0.5, 0.1, 0.1});
     EXPECT_EQ(row(), (std::vector<double>{0, 0, 0, 1, 1, 0, 0, 0, 0}));  // its ends hold
 }
 
@@ -296,10 +297,10 @@ TEST(Wall, TakesItsDoorAlong)
             row += vx[f.lattice.node(4, j)] == 0 ? '#' : '.';
         return row;
     };
-    f.ops.begin_step(0, 0.1);
+    f.ops.begin_step({0, 0.1, 0.1});
     EXPECT_EQ(held(), ".##.###..");
-    f.ops.end_step(0.1);
-    f.ops.begin_step(0.1, 0.1);  // a cell farther
+    f.ops.end_step({0, 0.1, 0.1});
+    f.ops.begin_step({0.1, 0.1, 0.1});  // a cell farther
     EXPECT_EQ(held(), "..##.###.");
 }
 
@@ -307,7 +308,7 @@ TEST(Wall, TakesItsDoorAlong)
 TEST(Wall, TakesTheRingAroundTheLattice)
 {
     Fixture f("[[wall]]\nname = \"left\"\nmin = [0.0, 0.0]\nmax = [0.0, 4.0]\n");
-    f.ops.begin_step(0, 0.1);
+    f.ops.begin_step({0, 0.1, 0.1});
     std::vector<double> vx(f.nodes.vx.size(), 1), vy(f.nodes.vy.size(), 1);
     f.ops.restrain(f.lattice, f.nodes, vx, vy);
     for (int j = -1; j <= f.lattice.ny + 1; ++j)

@@ -33,7 +33,7 @@ struct Body
 
 /// What makes forces at the points [p, p + lanes) [Pa]: their stress beyond the confining pressure. The one place that puts it together.
 template <class Lanes>
-TESTBED_INLINE SymTensor<Pack> total_stress(const Body& body, std::size_t p, const Lanes& lanes)
+TESTBED_INLINE inline SymTensor<Pack> total_stress(const Body& body, std::size_t p, const Lanes& lanes)
 {
     const Points& q = body.points;
     const Pack pressure(body.confinement);

@@ -5,8 +5,6 @@
 
 namespace testbed
 {
-namespace
-{
 double plastic_work_per_shear(const Body& body, std::size_t p)
 {
     return std::visit(
@@ -19,7 +17,6 @@ double plastic_work_per_shear(const Body& body, std::size_t p)
         },
         body.material);
 }
-}  // namespace
 
 double PlasticWork::add(const std::vector<Body>& bodies)
 {

@@ -58,7 +58,7 @@ NodeOps::NodeOps(const Scene& scene, const Lattice& lattice)
     }
 }
 
-void NodeOps::begin_step(double t, double dt)
+void NodeOps::begin_step(const Step& step)
 {
     power_ = {};
     load_x_.clear();
@@ -66,7 +66,7 @@ void NodeOps::begin_step(double t, double dt)
     for (std::size_t k = 0; k < walls_.size(); ++k)
     {
         Restraint& own = restraints_[first_wall_ + k];
-        if (walls_[k].begin_step(t, dt, own))
+        if (walls_[k].begin_step(step, own))
             seen_ = 0;
         if (const auto& nodes = walls_[k].new_nodes(); !nodes.empty())
             if (const Restraint* other = in_the_way(nodes, own, restraints_))
@@ -76,12 +76,12 @@ void NodeOps::begin_step(double t, double dt)
     }
 }
 
-void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, double t)
+void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, const Step& step)
 {
     if (gravity_)
     {
-        gravity_->apply(nodes, weight_of(nodes), t);
-        const double factor = gravity_->factor(t);
+        gravity_->apply(nodes, weight_of(nodes), step.t);
+        const double factor = gravity_->factor(step.t);
         gravity_now_ = {factor * gravity_->acceleration[0], factor * gravity_->acceleration[1]};
     }
     find_driven(lattice, nodes);

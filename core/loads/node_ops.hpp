@@ -2,6 +2,7 @@
 /// Operations at nodes, common to LPFDM and MPM: what a scene does not have is absent from the lists.
 
 #include "core/base/parallel.hpp"
+#include "core/base/step.hpp"
 #include "core/loads/nodal_work.hpp"
 #include "core/loads/walls.hpp"
 
@@ -124,16 +125,16 @@ public:
 
     /// Gravity takes these masses of the nodes for those that have weight, from now on.
     void weigh_with(const std::vector<double>& mass) { weight_ = &mass; }
-    /// Takes the walls to time t, and to their velocity in the coming step.
+    /// Takes the walls to the start of the step, and to their velocity in it.
     /// @throws Diverged when a wall has left the lattice or has reached what stands in its way
-    void begin_step(double t, double dt);
-    void end_step(double dt)
+    void begin_step(const Step& step);
+    void end_step(const Step& step)
     {
         for (Wall& wall : walls_)
-            wall.end_step(dt);
+            wall.end_step(step);
     }
     /// Gravity, the reactions of supports and walls, and damping of what is then out of balance.
-    void apply_forces(const Lattice& lattice, Nodes& nodes, double t);
+    void apply_forces(const Lattice& lattice, Nodes& nodes, const Step& step);
     /// Supports and walls prescribe the velocity. @param counts whether the motion of the soil takes over what that changes
     void restrain(const Lattice& lattice, const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy, bool counts = true)
     {

@@ -31,29 +31,29 @@ Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice) : s
         velocity_.emplace(*spec.velocity, scene.expression_constants());
 }
 
-bool Wall::begin_step(double t, double dt, Restraint& restraint)
+bool Wall::begin_step(const Step& step, Restraint& restraint)
 {
     new_nodes_.clear();
-    const Region now = region(t);
+    const Region now = region(step.t);
     const bool others = now != taken_;
     if (others)
     {
-        check_on_lattice(now, t);
+        check_on_lattice(now, step.t);
         take(now, restraint);
     }
     if (!velocity_)
         return others;
-    const Vec2 v = (*velocity_)({.t = t + 0.5 * dt});
+    const Vec2 v = (*velocity_)({.t = step.t + 0.5 * step.dt});
     travel_rate_ = v;
     for (std::size_t k = 0; k < 2; ++k)
         restraint.components[k].velocity = fixes(spec_.fix, k) ? v[k] : 0;
     return others;
 }
 
-void Wall::end_step(double dt)
+void Wall::end_step(const Step& step)
 {
     for (std::size_t k = 0; k < 2; ++k)
-        travel_[k] += dt * travel_rate_[k];
+        travel_[k] += step.dt * travel_rate_[k];
 }
 
 Wall::Region Wall::region(double t) const

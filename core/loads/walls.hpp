@@ -2,6 +2,7 @@
 /// Moving walls (section 2.2 of the paper): all nodes lined up at the wall get its displacement increments; after one cell of
 /// travel the next line does. And a smooth variant, which prescribes the velocity at the wall's faces, wherever they lie.
 
+#include "core/base/step.hpp"
 #include "core/loads/restraint.hpp"
 #include "core/scene/wall_path.hpp"
 
@@ -12,11 +13,11 @@ class Wall
 public:
     Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice);
 
-    /// Sets the restraint to the nodes that the wall covers at time t, and to its velocity in the middle of the coming step. Returns
+    /// Sets the restraint to the nodes that the wall covers at the start of the step, and to its velocity in its middle. Returns
     /// whether they are others than before.
     /// @throws Diverged if the wall has left the lattice
-    bool begin_step(double t, double dt, Restraint& restraint);
-    void end_step(double dt);
+    bool begin_step(const Step& step, Restraint& restraint);
+    void end_step(const Step& step);
 
     /// @param restraint of this wall, which gets the nodes back that it had
     template <class Archive>

@@ -38,11 +38,11 @@ protected:
     }
 
     /// The forces of the outside, once those of the stresses are at the nodes.
-    void apply_loads(const char* phase, const Lattice& lattice, Nodes& nodes, double t)
+    void apply_loads(const char* phase, const Lattice& lattice, Nodes& nodes, const Step& step)
     {
         internal_ = force_norm(nodes);
         if (body_force_)
-            timer_("forcing", [&] { body_force_->evaluate(bodies_, t); });
+            timer_("forcing", [&] { body_force_->evaluate(bodies_, step.t); });
         timer_(phase,
                [&]
                {
@@ -52,12 +52,12 @@ protected:
                        node_ops_.apply_load(nodes,
                                             [&]
                                             {
-                                                tractions_->apply(lattice, bodies_, nodes, t);
+                                                tractions_->apply(lattice, bodies_, nodes, step.t);
                                                 gather_forces();
                                             });
                    if (weight_)
                        find_weight();
-                   node_ops_.apply_forces(lattice, nodes, t);
+                   node_ops_.apply_forces(lattice, nodes, step);
                });
     }
     /// What a step depends on beside the unknowns of nodes. Returns the lattice with the numbers that it has in the state.

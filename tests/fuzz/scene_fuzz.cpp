@@ -28,7 +28,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         try_expressions(scene);
         const Lattice lattice = make_lattice(scene.grid);
         make_bodies(scene, lattice, {.box = true, .velocity = true});
-        NodeOps(scene, lattice).begin_step(0, 1e-3);
+        NodeOps(scene, lattice).begin_step({0, 1e-3, 1e-3});
     }
     catch (const SceneError& e)
     {
