@@ -118,7 +118,7 @@ void Sampler::sample(const Vector& displacement, std::vector<Body>& bodies) cons
                              u = {u[0] + at.value[k] * ux, u[1] + at.value[k] * uy};
                              d = d + Gradient<>{at.dx[k] * ux, at.dy[k] * uy, at.dy[k] * ux, at.dx[k] * uy};
                          }
-                         const SymTensor<> stress = elastic_stress(base, d, q.stiffness.active() ? q.stiffness[p] : 1.0);
+                         const SymTensor<> stress = elastic_stress(base, d, stiffness_ratio(q, p));
                          q.x[p] = q.X[p] + u[0];
                          q.y[p] = q.Y[p] + u[1];
                          q.sxx[p] = stress.xx;

@@ -8,8 +8,6 @@
 #include "lpfdm/options.hpp"
 #include "lpfdm/time_step.hpp"
 
-#include <cmath>
-
 namespace testbed
 {
 namespace

@@ -37,11 +37,11 @@ Traits traits(const Scene& scene)
 {
     const auto& lpfdm = scene.options<LpfdmSpec>();
     const bool by_points = lpfdm.support == Support::point;
-    const std::string domains = "lpfdm.support=domain";
+    const std::string domains = by_points && lpfdm.volume_cap == 0 ? "lpfdm.support=domain" : "";
     return {.reach = by_points ? 1 : 2,
             .shares_cells = true,
             .damps_hourglass = lpfdm.hourglass > 0,
-            .remedies = {.crossing = by_points ? domains : "",
+            .remedies = {.crossing = domains,
                          .null_mode = lpfdm.hourglass == 0 ? "lpfdm.hourglass=0.05" : "",
                          .tension = by_points && lpfdm.volume_cap == 0 ? "lpfdm.volume_cap=2.0" : "",
                          .sliver = by_points                                   ? domains

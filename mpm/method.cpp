@@ -7,7 +7,6 @@
 #include "mpm/options.hpp"
 
 #include <algorithm>
-#include <map>
 
 namespace testbed
 {
@@ -15,9 +14,6 @@ namespace
 {
 using Shape = MpmSpec::Shape;
 using Strain = MpmSpec::Strain;
-
-// Below this share of a full node's mass the acceleration of a node is not limited by the soil around it.
-constexpr double sliver_mass = 1e-3;
 
 /// "linear with four_point or b_bar; bspline with four_point; ..."
 std::string lawful_combinations()
@@ -78,21 +74,23 @@ Traits traits(const Scene& scene)
 {
     const auto& mpm = scene.options<MpmSpec>();
     const bool linear = mpm.shape == Shape::linear, usl = mpm.scheme == MpmSpec::Scheme::usl;
+    const bool filters = mpm.null_space_filter != MpmSpec::Filter::none,
+               may_blend = mpm.flip == 1 && mpm.transfer == MpmSpec::Transfer::flip;
     const auto null_mode = [&]
     {
         if (linear)
-            return mpm.null_space_filter == MpmSpec::Filter::none ? "mpm.null_space_filter=cell" : "";
-        return mpm.flip == 1 ? "mpm.flip=0.99" : "";
+            return filters ? "" : "mpm.null_space_filter=cell";
+        return may_blend ? "mpm.flip=0.99" : "";
     };
     return {.reach = linear ? 1 : 2,
             .may_lock = mpm.strain != Strain::b_bar,
             .divides_by_slivers = usl,
-            .remedies = {.crossing = linear ? "mpm.shape=cpgimp" : "",
+            .remedies = {.crossing = linear && mpm.strain == Strain::four_point && !filters ? "mpm.shape=cpgimp" : "",
                          .null_mode = null_mode(),
                          .locking = linear ? "mpm.strain=b_bar" : "",
                          .tension = "",
                          .sliver = usl                             ? "mpm.scheme=musl"
-                                   : mpm.mass_cutoff < sliver_mass ? "mpm.mass_cutoff=0.001"
+                                   : mpm.mass_cutoff < sliver_mass ? fmt::format("mpm.mass_cutoff={}", sliver_mass)
                                                                    : ""}};
 }
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include "mpm/options.hpp"
 
+#include <stdexcept>
+
 namespace testbed
 {
 struct LinearShape;
@@ -17,17 +19,20 @@ std::unique_ptr<Solver> make_mpm_of(const Scene& scene);
 std::unique_ptr<Solver> make_mpm(const Scene& scene)
 {
     const auto& options = scene.options<MpmSpec>();
-    switch (options.shape)
+    switch (options.strain)
     {
-    case MpmSpec::Shape::cpgimp: return make_mpm_of<GimpShape, PointStrain>(scene);
-    case MpmSpec::Shape::bspline: return make_mpm_of<BSplineShape, PointStrain>(scene);
-    case MpmSpec::Shape::linear:
-        switch (options.strain)
+    case MpmSpec::Strain::four_point:
+        switch (options.shape)
         {
-        case MpmSpec::Strain::four_point: return make_mpm_of<LinearShape, PointStrain>(scene);
-        case MpmSpec::Strain::b_bar: return make_mpm_of<LinearShape, BBarStrain>(scene);
+        case MpmSpec::Shape::linear: return make_mpm_of<LinearShape, PointStrain>(scene);
+        case MpmSpec::Shape::bspline: return make_mpm_of<BSplineShape, PointStrain>(scene);
+        case MpmSpec::Shape::cpgimp: return make_mpm_of<GimpShape, PointStrain>(scene);
         }
+        break;
+    case MpmSpec::Strain::b_bar:
+        if (options.shape == MpmSpec::Shape::linear)
+            return make_mpm_of<LinearShape, BBarStrain>(scene);
     }
-    throw std::logic_error("not a shape, or not a strain");
+    throw std::logic_error("shape and strain do not go together: see mpm_combinations");
 }
 }  // namespace testbed

@@ -25,7 +25,7 @@ inline Eigen::Matrix<double, 4, 2> solve_projection(const Eigen::Matrix4d& gram,
     return modes.eigenvectors() * inverse.asDiagonal() * modes.eigenvectors().transpose() * momentum;
 }
 
-/// The points of one bin. @tparam Shape LinearShape
+/// The points of one bin. @tparam Shape of two nodes, not smooth
 template <class Shape>
 void filter_null_space(const BinFrame& frame, Points& q, const Bin& bin)
 {

@@ -8,10 +8,6 @@
 #include "mpm/time_step.hpp"
 #include "mpm/velocity_update.hpp"
 
-#include <atomic>
-#include <cmath>
-#include <limits>
-
 namespace testbed
 {
 template <class Shape, class Strain>

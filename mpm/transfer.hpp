@@ -77,7 +77,7 @@ public:
     template <class Shape>
     Slopes slopes(double scale) const
     {
-        static_assert(!Shape::is_smooth);
+        static_assert(Shape::S == 2 && !Shape::is_smooth);
         const double all = sum(volume_);
         const ShapeAt<Shape> at({Pack(sum(ax_) / all), Pack(sum(ay_) / all), Pack(0.0), Pack(0.0)}, scale);
         Slopes s;

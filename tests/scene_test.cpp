@@ -108,6 +108,43 @@ TEST(Variant, LabelSaysWhatTheSceneChanged)
     EXPECT_EQ(variant_label(test::load(minimal, "mpm-linear", {"lpfdm.support=point"})), "mpm-linear");
 }
 
+TEST(Method, RefusesShapesAndStrainsThatDoNotGoTogether)
+{
+    for (const char* shape : {"mpm.shape=bspline", "mpm.shape=cpgimp"})
+        test::expect_problem(minimal, {"method=mpm-linear-bbar", shape},
+                             "linear with four_point or b_bar; bspline with four_point; cpgimp with four_point");
+}
+
+/// What helps is a setting that the scene takes, whatever its other options.
+TEST(Method, RemediesAreAccepted)
+{
+    const std::vector<std::vector<std::string>> options{{},
+                                                        {"lpfdm.support=point", "lpfdm.volume_cap=2.0"},
+                                                        {"lpfdm.support=point", "lpfdm.hourglass=0"},
+                                                        {"lpfdm.convection=central"},
+                                                        {"mpm.null_space_filter=cell"},
+                                                        {"mpm.transfer=xpic"},
+                                                        {"mpm.flip=0.9"},
+                                                        {"mpm.scheme=usl", "mpm.mass_cutoff=0.01"},
+                                                        {"mpm.mass_cutoff=0"}};
+    std::size_t tried = 0;
+    for (const std::string& variant : variant_names())
+        for (std::vector<std::string> settings : options)
+        {
+            if (settings == std::vector<std::string>{"mpm.null_space_filter=cell"} && !variant.starts_with("mpm-linear"))
+                continue;  // refused for wider shapes
+            const Remedies remedies = traits_of(test::load(minimal, variant, settings)).remedies;
+            settings.emplace_back();
+            for (const std::string& remedy : {remedies.crossing, remedies.null_mode, remedies.locking, remedies.tension, remedies.sliver})
+                if (settings.back() = remedy; !remedy.empty())
+                {
+                    ++tried;
+                    EXPECT_NO_THROW(test::load(minimal, variant, settings)) << variant << " " << remedy;
+                }
+        }
+    EXPECT_GT(tried, 80);
+}
+
 TEST(Scene, AllProblemsAtOnceWithLineAndSuggestion)
 {
     std::string text = replaced(minimal, "cell_size = 0.5", "cel_size = 0.5");

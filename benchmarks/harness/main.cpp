@@ -115,14 +115,15 @@ void check(const RunOptions& options, bool resolved)
     for (const BodySpec& body : scene.bodies)
         points += fill(scene, body).size();
     fmt::print("points           {}\n", points);
-    if (!traits_of(scene).has_points)
+    const Method& method = method_of(scene);
+    if (!method.make)
     {
         fmt::print("time step        {:.5g} s, critical {:.5g} s, {:.0f} steps\n", time_step(scene), critical_time_step(scene),
                    std::ceil(scene.time.end / time_step(scene)));
-        fmt::print("the FEM reference samples its solution at these points; it keeps no particle fields\n");
+        fmt::print("testbed-{} samples its solution at these points; it keeps no particle fields\n", method.name);
         return;
     }
-    const std::unique_ptr<Solver> solver = method_of(scene).make(scene);
+    const std::unique_ptr<Solver> solver = method.make(scene);
     if (const std::string warning = step_warning(scene, *solver); !warning.empty())
         warn(options, warning);
     const double dt = time_step(scene, *solver);

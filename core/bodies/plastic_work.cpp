@@ -1,8 +1,5 @@
 #include "core/bodies/plastic_work.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 namespace testbed
 {
 double plastic_work_per_shear(const Body& body, std::size_t p)

@@ -6,7 +6,7 @@
 namespace testbed
 {
 /// Plastic work per plastic shear strain of a stress on the Mohr-Coulomb surface that flows on a face: the multiplier is half of the
-/// plastic shear strain, so that it is (s1 (1 + sin psi) - s3 (1 - sin psi)) / 2 [Pa].
+/// plastic shear strain, so that it is (s1 (1 + sin psi) - s3 (1 - sin psi)) / 2 [Pa]; zero for a law without one.
 double plastic_work_per_shear(const Body& body, std::size_t p);
 
 class PlasticWork

@@ -12,7 +12,7 @@ using Material = std::variant<LinearElastic, HypoelasticJaumann, HypoelasticExac
                               VaryingStiffness<HypoelasticJaumann>, VaryingStiffness<HypoelasticExactRotation>, MohrCoulomb,
                               MohrCoulombField<true, false>, MohrCoulombField<false, true>, MohrCoulombField<true, true>>;
 
-/// What a law must offer: a pure point function (FEM quadrature and constant-strain triangles call it, too), its batch form, and what only
+/// What a law must offer: a pure point function (which a quadrature point or a triangle can call, too), its batch form, and what only
 /// the law knows of itself: energy, wave speed, out-of-plane stress, kinematics.
 template <class Law>
 concept MaterialLaw = requires(const Law law, typename Law::template State<double> state, Points points, Gradient<double> d,
@@ -32,6 +32,9 @@ concept MaterialLaw = requires(const Law law, typename Law::template State<doubl
         } -> std::same_as<double>;
     {
         law.out_of_plane_stress(points, std::size_t{})
+        } -> std::same_as<double>;
+    {
+        law.elastic_out_of_plane_stress(SymTensor<>{})
         } -> std::same_as<double>;
     law.allocate(points);
     law.update(state, d);

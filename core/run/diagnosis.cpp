@@ -10,8 +10,6 @@ namespace
 {
 // A smooth field has (k L)^4 / 16 of its energy in the pattern, 2 % at eight cells a wave; noise has a quarter.
 constexpr double pattern_rules = 0.2;
-// Below this share of a full node's mass the acceleration of a node is not limited by the soil around it.
-constexpr double sliver_mass = 1e-3;
 // Points of one cell see one smooth field: their spread is of the order of L over the size of the body.
 constexpr double oscillates = 0.7;
 // Points that move half a cell in a step are at the limit of convection within the next ones.

@@ -130,7 +130,7 @@ public:
                                 parallel_max(q.count,
                                              [&](std::size_t p)
                                              {
-                                                 const double softer = q.stiffness.active() ? q.stiffness[p] : 1.0;
+                                                 const double softer = stiffness_ratio(q, p);
                                                  const double szz = out_of_plane_stress(body.material, q, p);
                                                  const double mean = m.poissons_ratio() * (q.sxx[p] + q.syy[p] + szz);
                                                  const double a = (1 + m.poissons_ratio()) * q.sxx[p] - mean,

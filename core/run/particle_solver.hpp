@@ -17,6 +17,7 @@ public:
     const PhaseTimer& timer() const final { return timer_; }
     std::vector<RestraintRecord> restraints() const final { return node_ops_.records(); }
     NodalWork* work_done() final { return &node_ops_.work_done(); }
+    /// All laws add up one strain so far.
     Kinematics kinematics() const final { return testbed::kinematics(bodies_.front().material); }
 
 protected:

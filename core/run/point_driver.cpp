@@ -45,7 +45,7 @@ private:
         if constexpr (requires { s.stress_zz; })
             return {s.stress, s.stress_zz, s.plastic_shear_strain};
         else
-            return {s.stress, law_.moduli.poissons_ratio() * (s.stress.xx + s.stress.yy), 0};
+            return {s.stress, law_.elastic_out_of_plane_stress(s.stress), 0};
     }
     Law law_;
     State state_;

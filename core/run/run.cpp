@@ -98,11 +98,21 @@ void try_remedy(const RunOptions& options, const MakeSolver& make_solver, const 
     again.output = std::filesystem::path(output).replace_extension(".remedy.h5").string();
     again.quiet = true;
     again.diagnose = false;
-    const Outcome other = run_once(again, make_solver);
+    const char* what = "was run and does not hold";
+    try
+    {
+        const Outcome other = run_once(again, make_solver);
+        if (other.completed() && other.sound())
+            what = nullptr;
+    }
+    catch (const SceneError&)
+    {
+        what = "does not go with this scene";
+    }
     out.remedy_was_run = true;
-    if (other.completed() && other.sound())
+    if (!what)
         return;
-    fmt::print(stderr, "{} was run and does not hold\n", out.diagnosis.remedy);
+    fmt::print(stderr, "{} {}\n", out.diagnosis.remedy, what);
     out.diagnosis.remedy.clear();
 }
 

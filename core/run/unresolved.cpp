@@ -125,8 +125,8 @@ double unresolved_energy(const std::vector<Body>& bodies, const Lattice& lattice
     for_each_unresolved(bodies, lattice, cell_size,
                         [&](const Body& body, std::size_t p, const SymTensor<>& r)
                         {
-                            const double density =
-                                std::visit([&](const auto& law) { return law.energy_density(r, elastic_szz(body, r)); }, body.material);
+                            const double density = std::visit(
+                                [&](const auto& law) { return law.energy_density(r, law.elastic_out_of_plane_stress(r)); }, body.material);
                             total += body.points.current_volume(p) * density / stiffness_ratio(body.points, p);
                         });
     for (std::size_t b = 0; b < bodies.size(); ++b)

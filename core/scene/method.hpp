@@ -23,7 +23,11 @@ struct Variant
     void (*apply)(Scene&);
 };
 
-/// Settings, as for --set, that help where a run went wrong; empty where the method has none, or has it on already.
+/// Below this share of a full node's mass the acceleration of a node is not limited by the soil around it.
+inline constexpr double sliver_mass = 1e-3;
+
+/// Settings, as for --set, that help where a run went wrong; empty where the method has none, or has it on
+/// already, or the other options exclude it.
 struct Remedies
 {
     std::string crossing = "";   ///< of points that belong to a cell as a whole
@@ -37,7 +41,7 @@ struct Remedies
 struct Traits
 {
     bool has_points = true;           ///< that move, and are its state; FEM samples its solution at them
-    int reach = 2;                    ///< cells across which one point may act; 1: it belongs to one cell as a whole
+    int reach = 2;                    ///< bins apart at which two points still share a node; 1: a point belongs to one cell as a whole
     double elements_per_cell = 1;     ///< along a side
     bool shares_cells = false;        ///< nodes take a cell's mass as a whole, wherever its points lie
     bool damps_hourglass = false;     ///< by a force of its own

@@ -81,6 +81,6 @@ void check_materials(const Scene& scene, Problems& problems, const std::function
 /// every single one. Defined in bounds.cpp.
 void check_bounds(const Scene& scene, Problems& problems);
 void check_limits(const Scene& scene, Problems& problems);
-/// For the methods that do.
+/// For methods that do, from their warn().
 void warn_of_locking(const Scene& scene, Problems& problems);
 }  // namespace testbed

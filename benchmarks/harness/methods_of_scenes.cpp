@@ -4,7 +4,7 @@
 
 namespace testbed
 {
-/// All methods, as scenes know them: nothing is run here.
+/// All methods as scenes know them, for programs that run none of them.
 const std::vector<Method>& methods()
 {
     static const std::vector<Method> rows{lpfdm_method(), mpm_method(), fem_method()};
