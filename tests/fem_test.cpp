@@ -4,6 +4,7 @@
 #include "tests/quadrilateral.hpp"
 
 #include <cmath>
+#include <deal.II/base/quadrature_lib.h>
 #include <deal.II/dofs/dof_handler.h>
 #include <deal.II/fe/fe_q.h>
 #include <deal.II/fe/fe_values.h>
