@@ -15,6 +15,7 @@ struct MpmGrid
 {
     static constexpr int S = Shape::S;
     static constexpr bool reaches_beyond = Shape::reaches_beyond;  ///< the lattice's edge
+    static_assert(!reaches_beyond || Shape::S == 3, "LatticeEdges folds quadratic B-splines");
 
     Lattice lattice;
     Nodes nodes;

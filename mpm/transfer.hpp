@@ -9,8 +9,18 @@
 
 namespace testbed
 {
-/// Values and gradients of the S x S shape functions at a pack of points; gradients in 1/m.
+/// Nodal shape functions as a point sees them, in one direction: weights are the values at the S nodes from the bin's first on, slopes are
+/// per cell, both of (a, width) as in core/bodies/support.hpp. Smooth: slopes do not jump at lines of nodes. Beyond: the edge of the
+/// lattice.
 template <class Shape>
+concept NodalShape = requires
+{
+    Shape::S, Shape::has_box, Shape::is_smooth, Shape::reaches_beyond;
+    Shape::weights(0.5, 1.0).size() + Shape::slopes(0.5, 1.0).size();
+};
+
+/// Values and gradients of the S x S shape functions at a pack of points; gradients in 1/m.
+template <NodalShape Shape>
 struct ShapeAt
 {
     static constexpr int S = Shape::S;

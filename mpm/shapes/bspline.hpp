@@ -1,6 +1,4 @@
 #pragma once
-/// Nodal shape functions as a point sees them, in one direction: values at the S nodes from the bin's first on, and slopes
-/// per cell. `a` and `width` as in core/bodies/support.hpp.
 
 #include "core/bodies/support.hpp"
 
@@ -12,8 +10,8 @@ struct BSplineShape
 {
     static constexpr int S = 3;
     static constexpr bool has_box = false;
-    static constexpr bool is_smooth = true;       ///< slopes do not jump at lines of nodes
-    static constexpr bool reaches_beyond = true;  ///< the edge of the lattice
+    static constexpr bool is_smooth = true;
+    static constexpr bool reaches_beyond = true;
     static constexpr double half_width = 0.5;
 
     template <class T>

@@ -1,6 +1,4 @@
 #pragma once
-/// Nodal shape functions as a point sees them, in one direction: values at the S nodes from the bin's first on, and slopes
-/// per cell. `a` and `width` as in core/bodies/support.hpp.
 
 #include "core/bodies/support.hpp"
 
@@ -11,8 +9,8 @@ struct LinearShape
 {
     static constexpr int S = 2;
     static constexpr bool has_box = false;
-    static constexpr bool is_smooth = false;       ///< slopes do not jump at lines of nodes
-    static constexpr bool reaches_beyond = false;  ///< the edge of the lattice
+    static constexpr bool is_smooth = false;
+    static constexpr bool reaches_beyond = false;
     static constexpr double half_width = 0;
 
     template <class T>
