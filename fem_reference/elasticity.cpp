@@ -16,18 +16,18 @@ namespace testbed
 namespace
 {
 /// Of the displacement field that is the shape function.
-Gradient<> gradient_of(unsigned int component, const dealii::Tensor<1, 2>& d)
+Gradient<2> gradient_of(unsigned int component, const dealii::Tensor<1, 2>& d)
 {
-    return component == 0 ? Gradient<>{.xx = d[0], .xy = d[1]} : Gradient<>{.yy = d[1], .yx = d[0]};
+    return component == 0 ? Gradient<2>{.xx = d[0], .xy = d[1]} : Gradient<2>{.yy = d[1], .yx = d[0]};
 }
 
-double contract(const SymTensor<>& stress, const Gradient<>& d)
+double contract(const SymTensor<2>& stress, const Gradient<2>& d)
 {
     return stress.xx * d.xx + stress.yy * d.yy + stress.xy * d.shear();
 }
 }  // namespace
 
-Elasticity::Elasticity(const Scene& scene, const Lattice& lattice, const Warn& warn)
+Elasticity::Elasticity(const Scene& scene, const Lattice<2>& lattice, const Warn& warn)
     : scene_(scene),
       element_(dealii::FE_Q<2>(static_cast<unsigned int>(scene.options<FemSpec>().degree)), 2)
 {
@@ -86,7 +86,7 @@ dealii::FullMatrix<double> Elasticity::cell_stiffness(const Medium& medium, cons
 {
     const unsigned int n = element_.n_dofs_per_cell();
     dealii::FullMatrix<double> result(n, n);
-    std::vector<Gradient<>> gradient(n);
+    std::vector<Gradient<2>> gradient(n);
     for (const unsigned int q : values.quadrature_point_indices())
     {
         const double ratio = stiffness_ratio(medium, values.quadrature_point(q));
@@ -94,7 +94,7 @@ dealii::FullMatrix<double> Elasticity::cell_stiffness(const Medium& medium, cons
             gradient[i] = gradient_of(element_.system_to_component_index(i).first, values.shape_grad(i, q));
         for (unsigned int j = 0; j < n; ++j)
         {
-            const SymTensor<> stress = elastic_stress(medium.moduli, gradient[j], ratio);
+            const SymTensor<2> stress = elastic_stress(medium.moduli, gradient[j], ratio);
             for (unsigned int i = 0; i < n; ++i)
                 result(i, j) += contract(stress, gradient[i]) * values.JxW(q);
         }

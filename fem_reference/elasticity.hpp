@@ -20,7 +20,7 @@ using Matrix = dealii::SparseMatrix<double>;
 using Vector = dealii::Vector<double>;
 
 /// D : grad u. @param stiffness factor on the moduli
-inline SymTensor<> elastic_stress(const ElasticModuli& moduli, const Gradient<>& gradient, double stiffness = 1)
+inline SymTensor<2> elastic_stress(const ElasticModuli& moduli, const Gradient<2>& gradient, double stiffness = 1)
 {
     const LinearElastic law{moduli};
     LinearElastic::State<double> state;
@@ -45,7 +45,7 @@ class Elasticity
 {
 public:
     /// Mesh, unknowns and supports; no matrices yet. @throws SceneError
-    Elasticity(const Scene& scene, const Lattice& lattice, const Warn& warn);
+    Elasticity(const Scene& scene, const Lattice<2>& lattice, const Warn& warn);
 
     /// Stiffness, gravity and mass. @throws SceneError for a Young's modulus that is not positive
     void assemble(MassKind mass_kind);

@@ -19,7 +19,7 @@ public:
     void update_points() override;
     const std::vector<Body>& bodies() const override { return bodies_; }
     /// Newmark: at the time of the last prepare(); central differences: at the half step before.
-    Vec2 velocity(std::size_t body, std::size_t point) const override { return sampler_.value(velocity_, body, point); }
+    Vec<2> velocity(std::size_t body, std::size_t point) const override { return sampler_.value(velocity_, body, point); }
     std::size_t unknowns() const override { return elasticity_.unknowns(); }
     std::size_t active_cells() const override { return elasticity_.cells(); }
     std::size_t bytes() const override;
@@ -57,7 +57,7 @@ protected:
     }
 
     std::string path_;
-    Lattice lattice_;
+    Lattice<2> lattice_;
     std::vector<Body> bodies_;
     Elasticity elasticity_;
     Sampler sampler_;

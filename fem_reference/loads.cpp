@@ -29,7 +29,7 @@ void Elasticity::add_body_force(double t, Vector& force) const
         cell->get_dof_indices(ids);
         for (const unsigned int q : values.quadrature_point_indices())
         {
-            const Vec2 b = (*body_force_)(place_of(values.quadrature_point(q), t));
+            const Vec<2> b = (*body_force_)(place_of(values.quadrature_point(q), t));
             const double mass = media_[cell->material_id()].density * values.JxW(q);
             for (unsigned int i = 0; i < ids.size(); ++i)
                 force(ids[i]) += mass * b[component_[ids[i]]] * values.shape_value(i, q);
@@ -58,7 +58,7 @@ void Elasticity::add_tractions(double t, Vector& force) const
                 cell->get_dof_indices(ids);
                 for (const unsigned int q : values.quadrature_point_indices())
                 {
-                    const Vec2 p = traction(place_of(values.quadrature_point(q), t));
+                    const Vec<2> p = traction(place_of(values.quadrature_point(q), t));
                     for (unsigned int i = 0; i < ids.size(); ++i)
                         force(ids[i]) += p[component_[ids[i]]] * values.shape_value(i, q) * values.JxW(q);
                 }

@@ -15,9 +15,9 @@ namespace
 {
 using Cell = std::pair<int, int>;  ///< row, column
 
-void check_box_on_lattice(const Scene& scene, const BodySpec& body, const Lattice& lattice)
+void check_box_on_lattice(const Scene& scene, const BodySpec& body, const Lattice<2>& lattice)
 {
-    for (const Vec2& corner : {*body.min, *body.max})
+    for (const Vec<2>& corner : {*body.min, *body.max})
         for (std::size_t k = 0; k < 2; ++k)
         {
             const double cells = (corner[k] - lattice.origin[k]) / lattice.cell_size;
@@ -42,10 +42,10 @@ double area(const BodySpec& body)
 }
 
 /// Cells of one body: its points, were there one per cell, stand at their centres.
-std::vector<Cell> covered_cells(const Scene& coarse, const BodySpec& body, const Lattice& lattice)
+std::vector<Cell> covered_cells(const Scene& coarse, const BodySpec& body, const Lattice<2>& lattice)
 {
     std::vector<Cell> cells;
-    for (const Vec2& centre : fill(coarse, body))
+    for (const Vec<2>& centre : fill(coarse, body))
     {
         const int i = static_cast<int>(std::floor((centre[0] - lattice.origin[0]) / lattice.cell_size));
         const int j = static_cast<int>(std::floor((centre[1] - lattice.origin[1]) / lattice.cell_size));
@@ -57,10 +57,10 @@ std::vector<Cell> covered_cells(const Scene& coarse, const BodySpec& body, const
     return cells;
 }
 
-std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice& lattice, const Warn& warn)
+std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice<2>& lattice, const Warn& warn)
 {
     Scene coarse = scene;
-    coarse.grid = {lattice.origin, {lattice.nx * lattice.cell_size, lattice.ny * lattice.cell_size}, lattice.cell_size};
+    coarse.grid = {lattice.origin, {lattice.size[0] * lattice.cell_size, lattice.size[1] * lattice.cell_size}, lattice.cell_size};
     for (BodySpec& body : coarse.bodies)
         body.points_per_cell = 1;
     std::map<Cell, unsigned int> owner;
@@ -86,15 +86,15 @@ std::map<Cell, unsigned int> bodies_by_cell(const Scene& scene, const Lattice& l
 }
 }  // namespace
 
-Lattice mesh_lattice(const Scene& scene)
+Lattice<2> mesh_lattice(const Scene& scene)
 {
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     const auto box =
         std::find_if(scene.bodies.begin(), scene.bodies.end(), [](const BodySpec& body) { return body.shape == BodySpec::Shape::box; });
     if (box == scene.bodies.end())
         return lattice;
-    Vec2 origin = lattice.origin;
-    std::array<int, 2> cells{lattice.nx, lattice.ny};
+    Vec<2> origin = lattice.origin;
+    Index<2> cells = lattice.size;
     for (std::size_t k = 0; k < 2; ++k)
     {
         const double place = ((*box->min)[k] - lattice.origin[k]) / lattice.cell_size;
@@ -104,10 +104,10 @@ Lattice mesh_lattice(const Scene& scene)
         origin[k] += (part - 1) * lattice.cell_size;
         ++cells[k];
     }
-    return {origin, lattice.cell_size, cells[0], cells[1]};
+    return {origin, lattice.cell_size, cells};
 }
 
-void make_mesh(const Scene& scene, const Lattice& lattice, const Warn& warn, dealii::Triangulation<2>& mesh)
+void make_mesh(const Scene& scene, const Lattice<2>& lattice, const Warn& warn, dealii::Triangulation<2>& mesh)
 {
     std::vector<dealii::Point<2>> vertices;
     std::map<Cell, unsigned int> vertex_at;

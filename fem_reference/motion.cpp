@@ -57,7 +57,7 @@ MotionSums Elasticity::motion(const Vector& velocity) const
                                   [&](std::size_t dof)
                                   {
                                       const double p = momentum(dof);
-                                      const Vec2 arm{nodes_[dof][0] - scene_.grid.origin[0], nodes_[dof][1] - scene_.grid.origin[1]};
+                                      const Vec<2> arm{nodes_[dof][0] - scene_.grid.origin[0], nodes_[dof][1] - scene_.grid.origin[1]};
                                       return std::array<double, 4>{0.5 * p * velocity(dof), is_x(dof) ? p : 0, is_x(dof) ? 0 : p,
                                                                    is_x(dof) ? -arm[1] * p : arm[0] * p};
                                   });

@@ -6,10 +6,10 @@
 
 namespace testbed
 {
-Sampler::Sampler(const Scene& scene, const Lattice& lattice, const dealii::DoFHandler<2>& dofs, const std::vector<Body>& bodies)
+Sampler::Sampler(const Scene& scene, const Lattice<2>& lattice, const dealii::DoFHandler<2>& dofs, const std::vector<Body>& bodies)
     : cell_size_(lattice.cell_size / cells_per_lattice_cell(scene)),
-      nx_(lattice.nx * cells_per_lattice_cell(scene)),
-      ny_(lattice.ny * cells_per_lattice_cell(scene)),
+      nx_(lattice.size[0] * cells_per_lattice_cell(scene)),
+      ny_(lattice.size[1] * cells_per_lattice_cell(scene)),
       shapes_(dofs.get_fe().n_dofs_per_cell() / 2),
       cells_(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_))
 {
@@ -30,11 +30,11 @@ Sampler::Sampler(const Scene& scene, const Lattice& lattice, const dealii::DoFHa
     Patterns known;
     for (unsigned int b = 0; b < bodies.size(); ++b)
     {
-        const Points& q = bodies[b].points;
+        const Points<2>& q = bodies[b].points;
         std::vector<Location>& found = locations_.emplace_back();
         for (std::size_t p = 0; p < q.count; ++p)
         {
-            const Vec2 place{(q.X[p] - lattice.origin[0]) / cell_size_, (q.Y[p] - lattice.origin[1]) / cell_size_};
+            const Vec<2> place{(q.X[0][p] - lattice.origin[0]) / cell_size_, (q.X[1][p] - lattice.origin[1]) / cell_size_};
             const auto [i, j] = cell_of(place, b);
             const dealii::Point<2> unit(std::clamp(place[0] - i, 0.0, 1.0), std::clamp(place[1] - j, 0.0, 1.0));
             found.push_back({cell(i, j).number, pattern_at(unit, element, known)});
@@ -49,7 +49,7 @@ const Sampler::Cell& Sampler::cell(int i, int j) const
     return inside ? cells_[static_cast<std::size_t>(j) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(i)] : none;
 }
 
-std::pair<int, int> Sampler::cell_of(const Vec2& place, unsigned int body) const
+std::pair<int, int> Sampler::cell_of(const Vec<2>& place, unsigned int body) const
 {
     const double reach = 1e-6;
     for (const bool own : {true, false})
@@ -102,7 +102,7 @@ void Sampler::sample(const Vector& displacement, std::vector<Body>& bodies) cons
 {
     for (std::size_t b = 0; b < bodies.size(); ++b)
     {
-        Points& q = bodies[b].points;
+        Points<2>& q = bodies[b].points;
         const ElasticModuli base = moduli(bodies[b].material);
         parallel_for(q.count,
                      [&](std::size_t p)
@@ -110,29 +110,29 @@ void Sampler::sample(const Vector& displacement, std::vector<Body>& bodies) cons
                          const auto [cell, pattern] = locations_[b][p];
                          const Pattern& at = patterns_[pattern];
                          const std::uint32_t* dof = &dofs_[2 * shapes_ * cell];
-                         Vec2 u{0, 0};
-                         Gradient<> d;
+                         Vec<2> u{0, 0};
+                         Gradient<2> d;
                          for (std::size_t k = 0; k < shapes_; ++k)
                          {
                              const double ux = displacement(dof[2 * k]), uy = displacement(dof[2 * k + 1]);
                              u = {u[0] + at.value[k] * ux, u[1] + at.value[k] * uy};
-                             d = d + Gradient<>{at.dx[k] * ux, at.dy[k] * uy, at.dy[k] * ux, at.dx[k] * uy};
+                             d = d + Gradient<2>{at.dx[k] * ux, at.dy[k] * uy, at.dy[k] * ux, at.dx[k] * uy};
                          }
-                         const SymTensor<> stress = elastic_stress(base, d, stiffness_ratio(q, p));
-                         q.x[p] = q.X[p] + u[0];
-                         q.y[p] = q.Y[p] + u[1];
-                         q.sxx[p] = stress.xx;
-                         q.syy[p] = stress.yy;
-                         q.sxy[p] = stress.xy;
+                         const SymTensor<2> stress = elastic_stress(base, d, stiffness_ratio(q, p));
+                         q.x[0][p] = q.X[0][p] + u[0];
+                         q.x[1][p] = q.X[1][p] + u[1];
+                         q.stress[0][p] = stress.xx;
+                         q.stress[1][p] = stress.yy;
+                         q.stress[2][p] = stress.xy;
                      });
     }
 }
 
-Vec2 Sampler::value(const Vector& field, std::size_t body, std::size_t point) const
+Vec<2> Sampler::value(const Vector& field, std::size_t body, std::size_t point) const
 {
     const auto [cell, pattern] = locations_[body][point];
     const std::uint32_t* dof = &dofs_[2 * shapes_ * cell];
-    Vec2 sum{0, 0};
+    Vec<2> sum{0, 0};
     for (std::size_t k = 0; k < shapes_; ++k)
     {
         sum[0] += patterns_[pattern].value[k] * field(dof[2 * k]);

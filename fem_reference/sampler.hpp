@@ -12,12 +12,12 @@ class Sampler
 public:
     /// Finds the cell of each point. On an edge, a cell of the point's own body comes first, then the one to the upper right; a
     /// point beyond a stepped boundary takes the place on the mesh that is nearest.
-    Sampler(const Scene& scene, const Lattice& lattice, const dealii::DoFHandler<2>& dofs, const std::vector<Body>& bodies);
+    Sampler(const Scene& scene, const Lattice<2>& lattice, const dealii::DoFHandler<2>& dofs, const std::vector<Body>& bodies);
 
     /// Sets position and stress of all points from the displacement.
     void sample(const Vector& displacement, std::vector<Body>& bodies) const;
     /// A field of the mesh at the initial position of a point.
-    Vec2 value(const Vector& field, std::size_t body, std::size_t point) const;
+    Vec<2> value(const Vector& field, std::size_t body, std::size_t point) const;
     std::size_t bytes() const;
 
 private:
@@ -39,7 +39,7 @@ private:
     using Patterns = std::map<std::pair<long long, long long>, std::uint32_t>;
 
     const Cell& cell(int i, int j) const;
-    std::pair<int, int> cell_of(const Vec2& place, unsigned int body) const;
+    std::pair<int, int> cell_of(const Vec<2>& place, unsigned int body) const;
     std::uint32_t pattern_at(const dealii::Point<2>& unit, const dealii::FiniteElement<2>& element, Patterns& known);
 
     double cell_size_;

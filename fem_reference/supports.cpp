@@ -82,7 +82,7 @@ Vector Elasticity::prescribed(double t) const
     for (const Support& support : supports_)
         if (support.wall && support.wall->velocity)
         {
-            const Vec2 travel = wall_path(*support.wall, scene_.expression_constants(), t).back();
+            const Vec<2> travel = wall_path(*support.wall, scene_.expression_constants(), t).back();
             for (const auto dof : support.dofs)
                 u(dof) = travel[component_[dof]];
         }

@@ -5,32 +5,46 @@
 
 namespace testbed
 {
-using Velocity = std::array<Pack, 2>;
+/// v' of (I + G) v' = v.
+template <class T>
+TESTBED_INLINE inline Vec<2, T> departure(const Vec<2, T>& v, const Gradient<2, T>& g)
+{
+    const T one(1.0), inverse = one / ((one + g.xx) * (one + g.yy) - g.xy * g.yx);
+    return {((one + g.yy) * v[0] - g.xy * v[1]) * inverse, ((one + g.xx) * v[1] - g.yx * v[0]) * inverse};
+}
 
 /// As published: the gradient of the cell that holds the departure point x_k - du; no correction where that cell is empty.
 struct UpwindConvection
 {
     /// Eq. (13) as printed.
-    TESTBED_INLINE static Velocity correct(const Velocity& v, const Gradient<Pack>& g)
+    template <int dim>
+    TESTBED_INLINE static auto correct(const auto& v, const Gradient<dim, Pack>& g)
     {
-        return {v[0] - v[0] * g.xx - v[1] * g.xy, v[1] - v[0] * g.yx - v[1] * g.yy};
+        Vec<dim, Pack> corrected = v;
+        unrolled<dim>([&](auto i) TESTBED_INLINE
+                      { unrolled<dim>([&](auto j) TESTBED_INLINE { corrected[i] -= v[j] * component<i, j>(g); }); });
+        return corrected;
     }
 
-    template <class Lanes>
-    TESTBED_INLINE static Gradient<Pack> gradient(const LpfdmGrid& grid, std::size_t first_cell, const Lanes& lanes, Pack cx, Pack cy)
+    template <int dim, class Lanes>
+    TESTBED_INLINE static Gradient<dim, Pack> gradient(const LpfdmGrid<dim>& grid, std::size_t first_cell, const Lanes& lanes,
+                                                       const Vec<dim, Pack>& courant)
     {
-        const auto right = cx > Pack(0.0), up = cy > Pack(0.0);
-        Gradient<Pack> g{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
-        for (int k = 0; k < 4; ++k)
-        {
-            const std::size_t c = grid.around(first_cell, k);
-            const auto here = ((k & 1) ? right : !right) && ((k & 2) ? up : !up) && lanes.load(&grid.cells.mass[c]) > Pack(0.0);
-            const Gradient<Pack> at = grid.cells.gradient(c, lanes);
-            stdx::where(here, g.xx) = at.xx;
-            stdx::where(here, g.yy) = at.yy;
-            stdx::where(here, g.xy) = at.xy;
-            stdx::where(here, g.yx) = at.yx;
-        }
+        Gradient<dim, Pack> g = zero_gradient<dim>();
+        unrolled<LpfdmGrid<dim>::corners>(
+            [&](auto k) TESTBED_INLINE
+            {
+                const std::size_t c = grid.around(first_cell, k);
+                auto here = lanes.load(&grid.cells.mass[c]) > Pack(0.0);
+                unrolled<dim>(
+                    [&](auto d) TESTBED_INLINE
+                    {
+                        const auto upper = courant[d] > Pack(0.0);
+                        here = here && (is_upper(k, d) ? upper : !upper);
+                    });
+                const Gradient<dim, Pack> at = grid.cells.gradient_at(c, lanes);
+                unrolled<dim * dim>([&](auto n) TESTBED_INLINE { stdx::where(here, component<n>(g)) = component<n>(at); });
+            });
         return g;
     }
 };
@@ -42,79 +56,81 @@ struct CentralConvection
 {
     /// The node takes the velocity of what arrives from x - dt v', which for a linear field is (I + G) v' = v. Eq. (13) is its
     /// first order; what it drops adds up to a gain of angular momentum and energy in rotation.
-    TESTBED_INLINE static Velocity correct(const Velocity& v, const Gradient<Pack>& g)
-    {
-        const Pack one(1.0), inverse = one / ((one + g.xx) * (one + g.yy) - g.xy * g.yx);
-        return {((one + g.yy) * v[0] - g.xy * v[1]) * inverse, ((one + g.xx) * v[1] - g.yx * v[0]) * inverse};
-    }
+    TESTBED_INLINE static Vec<2, Pack> correct(const Vec<2, Pack>& v, const Gradient<2, Pack>& g) { return departure(v, g); }
 
-    template <class Lanes>
-    TESTBED_INLINE static Gradient<Pack> gradient(const LpfdmGrid& grid, std::size_t first_cell, const Lanes& lanes, Pack cx, Pack cy)
+    template <int dim, class Lanes>
+    TESTBED_INLINE static Gradient<dim, Pack> gradient(const LpfdmGrid<dim>& grid, std::size_t first_cell, const Lanes& lanes,
+                                                       const Vec<dim, Pack>& courant)
     {
         const Pack one(1.0);
-        Gradient<Pack> mean{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
+        Gradient<dim, Pack> mean = zero_gradient<dim>();
         Pack total(0.0);
-        for (int k = 0; k < 4; ++k)
-        {
-            const std::size_t c = grid.around(first_cell, k);
-            const Pack w = lanes.load(&grid.cells.mass[c]) * ((k & 1) ? one + cx : one - cx) * ((k & 2) ? one + cy : one - cy);
-            const Gradient<Pack> g = grid.cells.gradient(c, lanes);
-            mean = mean + Gradient<Pack>{w * g.xx, w * g.yy, w * g.xy, w * g.yx};
-            total += w;
-        }
+        unrolled<LpfdmGrid<dim>::corners>(
+            [&](auto k) TESTBED_INLINE
+            {
+                const std::size_t c = grid.around(first_cell, k);
+                Pack w = lanes.load(&grid.cells.mass[c]);
+                unrolled<dim>([&](auto d) TESTBED_INLINE { w *= is_upper(k, d) ? one + courant[d] : one - courant[d]; });
+                mean += w * grid.cells.gradient_at(c, lanes);
+                total += w;
+            });
         Pack inverse = one / total;
         stdx::where(!(total > Pack(0.0)), inverse) = Pack(0.0);
-        return {mean.xx * inverse, mean.yy * inverse, mean.xy * inverse, mean.yx * inverse};
+        return inverse * mean;
     }
 };
 
-/// Corrects the nodal velocity for the step dt that brought the lattice back; the cells hold the gradients of that step.
-template <class Scheme>
-void convect(LpfdmGrid& grid, double dt)
+/// How far the velocity carries in dt, at most a cell [cells].
+template <std::size_t dim>
+TESTBED_INLINE inline std::array<Pack, dim> courant_numbers(const std::array<Pack, dim>& v, double dt_over_L)
 {
-    const Pack courant(dt / grid.lattice.cell_size), one(1.0);
+    const Pack one(1.0);
+    std::array<Pack, dim> c;
+    unrolled<dim>([&](auto d) TESTBED_INLINE { c[d] = min(one, max(-one, v[d] * Pack(dt_over_L))); });
+    return c;
+}
+
+/// Corrects the nodal velocity for the step dt that brought the lattice back; the cells hold the gradients of that step.
+template <class Scheme, int dim>
+void convect(LpfdmGrid<dim>& grid, double dt)
+{
+    const double scale = dt / grid.lattice.cell_size;
     grid.for_each_node(
         [&](std::size_t n, std::size_t first_cell, const auto& lanes)
         {
-            const Velocity v{lanes.load(&grid.nodes.vx[n]), lanes.load(&grid.nodes.vy[n])};
-            const Pack cx = min(one, max(-one, v[0] * courant)), cy = min(one, max(-one, v[1] * courant));
-            const Velocity corrected = Scheme::correct(v, Scheme::gradient(grid, first_cell, lanes, cx, cy));
-            lanes.store(&grid.nodes.vx[n], corrected[0]);
-            lanes.store(&grid.nodes.vy[n], corrected[1]);
+            const Vec<dim, Pack> v = load(grid.nodes.v, n, lanes);
+            const Gradient<dim, Pack> g = Scheme::template gradient<dim>(grid, first_cell, lanes, courant_numbers(v, scale));
+            store(grid.nodes.v, n, lanes, Scheme::correct(v, g));
         });
 }
 
 /// Velocity of a node at a free face after a share of the convection, with what arrives there.
-inline Vec2 velocity_at_face(const LpfdmGrid& grid, const FreeFaces& faces, std::uint32_t n, double dt, double share,
-                             const std::vector<double>* mass_before)
+inline Vec<2> velocity_at_face(const LpfdmGrid<2>& grid, const FreeFaces& faces, std::uint32_t n, double dt, double share,
+                               const std::vector<double>* mass_before)
 {
-    Vec2 v{grid.nodes.vx[n], grid.nodes.vy[n]};
+    Vec<2> v = at(grid.nodes.v, n);
     const double won = mass_before ? 1 - (*mass_before)[n] / grid.nodes.mass[n] : 0;
     const double sliver = 1 - grid.nodes.mass[n] / (FreeFaces::sliver * faces.full_mass);
     const double part = std::max({0.0, won, sliver});
     if (part > 0)
     {
-        const Vec2 arriving = faces.arriving(grid, mass_before, n, 1 / (share * dt), v, part);
-        v = {v[0] + part * (arriving[0] - v[0]), v[1] + part * (arriving[1] - v[1])};
+        const Vec<2> arriving = faces.arriving(grid, mass_before, n, 1 / (share * dt), v, part);
+        for (std::size_t d = 0; d < 2; ++d)
+            v[d] += part * (arriving[d] - v[d]);
     }
-    const Gradient<> g = faces.across(grid, n, share, 1 - part);
-    const double inverse = 1 / ((1 + g.xx) * (1 + g.yy) - g.xy * g.yx);
-    return {((1 + g.yy) * v[0] - g.xy * v[1]) * inverse, ((1 + g.xx) * v[1] - g.yx * v[0]) * inverse};
+    return departure(v, faces.across(grid, n, share, 1 - part));
 }
 
 /// A share of the same, with the central difference inside and FreeFaces at the faces. The cells hold the gradients over dt.
 /// @param mass_before of nodes, in the step before; null: no mass arrives
-inline void convect(LpfdmGrid& grid, FreeFaces& faces, double dt, double share, const std::vector<double>* mass_before)
+inline void convect(LpfdmGrid<2>& grid, FreeFaces& faces, double dt, double share, const std::vector<double>* mass_before)
 {
-    const Pack courant(share * dt / grid.lattice.cell_size), one(1.0), part(share);
+    const double scale = share * dt / grid.lattice.cell_size;
     faces.keep(
         grid,
-        [&](std::size_t first_cell, const auto& lanes, const Velocity& v)
-        {
-            const Pack cx = min(one, max(-one, v[0] * courant)), cy = min(one, max(-one, v[1] * courant));
-            return part * CentralConvection::gradient(grid, first_cell, lanes, cx, cy);
-        },
-        [](const Velocity& v, const Gradient<Pack>& g) { return CentralConvection::correct(v, g); });
+        [&](std::size_t first_cell, const auto& lanes, const Vec<2, Pack>& v)
+        { return Pack(share) * CentralConvection::gradient<2>(grid, first_cell, lanes, courant_numbers(v, scale)); },
+        [](const Vec<2, Pack>& v, const Gradient<2, Pack>& g) { return CentralConvection::correct(v, g); });
     const auto& at_faces = faces.list();
     parallel_for(
         at_faces.size(),
@@ -122,10 +138,6 @@ inline void convect(LpfdmGrid& grid, FreeFaces& faces, double dt, double share, 
     // these continue what the others have become
     faces.give_velocity(grid.nodes);
     for (const auto n : faces.ahead())
-    {
-        const auto v = faces.around(grid, nullptr, n, 1 / (share * dt)).linear();
-        grid.nodes.vx[n] = v[0];
-        grid.nodes.vy[n] = v[1];
-    }
+        set(grid.nodes.v, n, faces.around(grid, nullptr, n, 1 / (share * dt)).linear());
 }
 }  // namespace testbed

@@ -19,23 +19,26 @@ struct Frontier
     /// or start from zero, as printed; at the start of a run they have one. Nodes that it left are cleared. Returns whether any changed.
     /// @param others whether other cells are in use than in the step before @param faces null if the convection has none
     template <int S>
-    bool extend(LpfdmGrid& grid, bool others, const Step& step, LpfdmSpec::Frontier kind, FreeFaces* faces)
+    bool extend(LpfdmGrid<2>& grid, bool others, const Step& step, LpfdmSpec::Frontier kind, FreeFaces* faces)
     {
-        Nodes& nodes = grid.nodes;
+        Nodes<2>& nodes = grid.nodes;
         if (!others && (S == 1 || !has_moved(nodes)))  // with S = 1 a cell in use has mass
             return false;
         if (!step.is_first())
             reach(grid, kind);
         for (const auto n : left)
         {
-            nodes.mass[n] = nodes.fx[n] = nodes.fy[n] = 0;
+            nodes.mass[n] = 0;
+            set(nodes.f, n, {0, 0});
             if (faces)
                 faces->forget(n);
         }
         const auto rest = [&](std::uint32_t n)
         {
-            if (!(nodes.mass[n] > 0))
-                mass_before[n] = nodes.vx[n] = nodes.vy[n] = 0;
+            if (nodes.mass[n] > 0)
+                return;
+            mass_before[n] = 0;
+            set(nodes.v, n, {0, 0});
         };
         std::for_each(nodes.active().begin(), nodes.active().end(), rest);
         std::for_each(left.begin(), left.end(), rest);
@@ -43,27 +46,24 @@ struct Frontier
         return true;
     }
 
-    void keep_mass(const Nodes& nodes)
+    void keep_mass(const Nodes<2>& nodes)
     {
         nodes.for_each([&](std::size_t n, const auto& lanes) { lanes.store(&mass_before[n], lanes.load(&nodes.mass[n])); });
     }
 
 private:
-    void reach(LpfdmGrid& grid, LpfdmSpec::Frontier kind) const
+    void reach(LpfdmGrid<2>& grid, LpfdmSpec::Frontier kind) const
     {
-        std::vector<std::pair<std::uint32_t, Vec2>> reached;  // all means are of what was active before
+        std::vector<std::pair<std::uint32_t, Vec<2>>> reached;  // all means are of what was active before
         for (const auto n : grid.nodes.active())
             if (grid.nodes.mass[n] > 0 && !mass_before[n])
-                reached.emplace_back(n, kind != LpfdmSpec::Frontier::literal ? mean_of_neighbours(grid, n) : Vec2{0, 0});
+                reached.emplace_back(n, kind != LpfdmSpec::Frontier::literal ? mean_of_neighbours(grid, n) : Vec<2>{0, 0});
         for (const auto& [n, v] : reached)
-        {
-            grid.nodes.vx[n] = v[0];
-            grid.nodes.vy[n] = v[1];
-        }
+            set(grid.nodes.v, n, v);
     }
 
     /// Whether a node won or lost its mass; those without come to rest.
-    bool has_moved(Nodes& nodes) const
+    bool has_moved(Nodes<2>& nodes) const
     {
         std::atomic<bool> moved{false};
         nodes.for_each(
@@ -75,33 +75,32 @@ private:
                     moved.store(true, std::memory_order_relaxed);
                 if (!lanes.any(!has))
                     return;
-                Pack vx = lanes.load(&nodes.vx[n]), vy = lanes.load(&nodes.vy[n]);
-                stdx::where(!has, vx) = Pack(0.0);
-                stdx::where(!has, vy) = Pack(0.0);
-                lanes.store(&nodes.vx[n], vx);
-                lanes.store(&nodes.vy[n], vy);
+                Vec<2, Pack> v = load(nodes.v, n, lanes);
+                for (Pack& component : v)
+                    stdx::where(!has, component) = Pack(0.0);
+                store(nodes.v, n, lanes, v);
             });
         return moved;
     }
 
-    Vec2 mean_of_neighbours(const LpfdmGrid& grid, std::uint32_t node) const
+    Vec<2> mean_of_neighbours(const LpfdmGrid<2>& grid, std::uint32_t node) const
     {
         double mass = 0;
-        Vec2 momentum{0, 0};
-        const int i = grid.lattice.node_i(node), j = grid.lattice.node_j(node);
-        for (int dj = -1; dj <= 1; ++dj)
-            for (int di = -1; di <= 1; ++di)
-            {
-                if (!grid.lattice.has_node(i + di, j + dj))
-                    continue;
-                const std::size_t n = grid.lattice.node(i + di, j + dj);
-                if (!mass_before[n])
-                    continue;
-                mass += grid.nodes.mass[n];
-                momentum[0] += grid.nodes.mass[n] * grid.nodes.vx[n];
-                momentum[1] += grid.nodes.mass[n] * grid.nodes.vy[n];
-            }
-        return mass > 0 ? Vec2{momentum[0] / mass, momentum[1] / mass} : Vec2{0, 0};
+        Vec<2> momentum{0, 0};
+        const Index<2> at = grid.lattice.node_index(node);
+        for_each_index(at + all<2>(-1), at + all<2>(2),
+                       [&](const Index<2>& near)
+                       {
+                           if (!grid.lattice.has_node(near))
+                               return;
+                           const std::size_t n = grid.lattice.node(near);
+                           if (!mass_before[n])
+                               return;
+                           mass += grid.nodes.mass[n];
+                           for (std::size_t d = 0; d < 2; ++d)
+                               momentum[d] += grid.nodes.mass[n] * grid.nodes.v[d][n];
+                       });
+        return mass > 0 ? Vec<2>{momentum[0] / mass, momentum[1] / mass} : Vec<2>{0, 0};
     }
 };
 }  // namespace testbed

@@ -3,76 +3,107 @@
 
 #include "core/lattice/gather.hpp"
 #include "core/lattice/kinematics.hpp"
+#include "core/lattice/nodes.hpp"
 
 namespace testbed
 {
+template <int dim>
 struct Cells
 {
-    std::vector<double> mass;            ///< M_j, eq. (7) [kg/m]; zero marks a cell without points
-    std::vector<double> sxx, syy, sxy;   ///< <sigma>_j, eq. (8) [Pa]
-    std::vector<double> xx, yy, xy, yx;  ///< gradient, eq. (5), of the increment over a step [-]
+    std::vector<double> mass;                       ///< M_j, eq. (7) [kg/m]; zero marks a cell without points
+    VectorField<symmetric_components<dim>> stress;  ///< <sigma>_j, eq. (8) [Pa]
+    VectorField<std::size_t{dim * dim}> gradient;   ///< eq. (5), of the increment over a step [-]
 
-    explicit Cells(std::size_t n) : mass(n), sxx(n), syy(n), sxy(n), xx(n), yy(n), xy(n), yx(n) {}
-    Gradient<> gradient(std::size_t c) const { return {xx[c], yy[c], xy[c], yx[c]}; }
-    template <class Lanes>
-    Gradient<Pack> gradient(std::size_t c, const Lanes& lanes) const
+    explicit Cells(std::size_t n) : mass(n)
     {
-        return {lanes.load(&xx[c]), lanes.load(&yy[c]), lanes.load(&xy[c]), lanes.load(&yx[c])};
+        for_each_component([&](auto& values) { values.resize(n); });
+    }
+    Gradient<dim> gradient_at(std::size_t c) const
+    {
+        Gradient<dim> g;
+        unrolled<dim * dim>([&](auto k) { component<k>(g) = gradient[k][c]; });
+        return g;
     }
     template <class Lanes>
-    SymTensor<Pack> stress(std::size_t c, const Lanes& lanes) const
+    Gradient<dim, Pack> gradient_at(std::size_t c, const Lanes& lanes) const
     {
-        return {lanes.load(&sxx[c]), lanes.load(&syy[c]), lanes.load(&sxy[c])};
+        Gradient<dim, Pack> g;
+        unrolled<dim * dim>([&](auto k) TESTBED_INLINE { component<k>(g) = lanes.load(&gradient[k][c]); });
+        return g;
+    }
+    template <class Lanes>
+    SymTensor<dim, Pack> stress_at(std::size_t c, const Lanes& lanes) const
+    {
+        SymTensor<dim, Pack> s;
+        unrolled<symmetric_components<dim>>([&](auto k) TESTBED_INLINE { component<k>(s) = lanes.load(&stress[k][c]); });
+        return s;
     }
     void clear(std::size_t c)
     {
-        for (auto* field : {&mass, &sxx, &syy, &sxy, &xx, &yy, &xy, &yx})
-            (*field)[c] = 0;
+        mass[c] = 0;
+        for_each_component([&](auto& values) { values[c] = 0; });
     }
-    std::size_t bytes() const { return 8 * mass.size() * sizeof(double); }
+    std::size_t bytes() const { return (1 + stress.size() + gradient.size()) * mass.size() * sizeof(double); }
+
+private:
+    template <class F>
+    void for_each_component(F&& f)
+    {
+        std::for_each(stress.begin(), stress.end(), f);
+        std::for_each(gradient.begin(), gradient.end(), f);
+    }
 };
 
+template <int dim>
 struct LpfdmGrid
 {
-    Lattice lattice;
-    Cells cells;
-    Nodes nodes;
+    static constexpr std::size_t corners = 1 << dim;
+
+    Lattice<dim> lattice;
+    Cells<dim> cells;
+    Nodes<dim> nodes;
     Gather gather;  ///< from points to cells
 
-    explicit LpfdmGrid(const Lattice& l) : lattice(l), cells(l.cells()), nodes(l.nodes()), gather(l.cells()) {}
+    explicit LpfdmGrid(const Lattice<dim>& l) : lattice(l), cells(l.cells()), nodes(l.nodes()), gather(l.cells()) {}
 
     /// Takes the nodes to the numbers of another lattice; the cells are empty until the next rebuild().
-    void renumber(const Lattice& to)
+    void renumber(const Lattice<dim>& to)
     {
         nodes.renumber(lattice, to);
-        cells = Cells(to.cells());
+        cells = Cells<dim>(to.cells());
         gather = Gather(to.cells());
         lattice = to;
     }
 
-    /// Corner k = 0..3, nodes [1]..[4], of the cell whose corner [1] is `first`.
-    std::size_t corner(std::size_t first, int k) const
+    /// Corner k = 0, 1, ..., nodes [1], [2], ..., of the cell whose corner [1] is `first`.
+    std::size_t corner(std::size_t first, std::size_t k) const
     {
-        return first + static_cast<std::size_t>(k & 1) + static_cast<std::size_t>(k >> 1) * lattice.node_stride();
+        for (int d = 0; d < dim; ++d)
+            if (is_upper(k, d))
+                first += lattice.node_stride(d);
+        return first;
     }
     /// The cell of which a node is corner k, from the cell of which it is corner [1].
-    std::size_t around(std::size_t first, int k) const
+    std::size_t around(std::size_t first, std::size_t k) const
     {
-        return first - static_cast<std::size_t>(k & 1) - static_cast<std::size_t>(k >> 1) * lattice.cell_stride();
+        for (int d = 0; d < dim; ++d)
+            if (is_upper(k, d))
+                first -= lattice.cell_stride(d);
+        return first;
     }
-    std::size_t first_node(std::size_t cell) const { return lattice.node(lattice.cell_i(cell), lattice.cell_j(cell)); }
-    std::size_t first_cell(std::size_t node) const { return lattice.cell(lattice.node_i(node), lattice.node_j(node)); }
+    std::size_t first_node(std::size_t cell) const { return lattice.node(lattice.cell_index(cell)); }
+    std::size_t first_cell(std::size_t node) const { return lattice.cell(lattice.node_index(node)); }
 
     /// Cells and nodes in use, from bins that were sorted anew. Returns the nodes that are no longer in use.
     template <int S>
-    std::vector<std::uint32_t> rebuild(std::span<const Bins* const> bins)
+    std::vector<std::uint32_t> rebuild(std::span<const Bins<dim>* const> bins)
     {
         for (const auto c : gather.active())
             cells.clear(c);
-        gather.rebuild<S>(bins, [&](int i, int j) { return lattice.cell(i, j); });
+        gather.rebuild<S>(bins, [&](const Index<dim>& at) { return lattice.cell(at); });
         std::vector<std::uint32_t> used;
         for (const auto c : gather.active())
-            for (int k = 0; k < 4; ++k)
+            for (std::size_t k = 0; k < corners; ++k)
                 used.push_back(static_cast<std::uint32_t>(corner(first_node(c), k)));
         std::sort(used.begin(), used.end());
         used.erase(std::unique(used.begin(), used.end()), used.end());
@@ -126,10 +157,11 @@ struct LpfdmGrid
     }
     /// Nodal values at the corners of the cells whose first nodes are [n, n + lanes).
     template <class Lanes>
-    std::array<Pack, 4> at_corners(const std::vector<double>& values, std::size_t n, const Lanes& lanes) const
+    TESTBED_INLINE std::array<Pack, corners> at_corners(const std::vector<double>& values, std::size_t n, const Lanes& lanes) const
     {
-        return {lanes.load(&values[n]), lanes.load(&values[corner(n, 1)]), lanes.load(&values[corner(n, 2)]),
-                lanes.load(&values[corner(n, 3)])};
+        std::array<Pack, corners> v;
+        unrolled<corners>([&](auto k) TESTBED_INLINE { v[k] = lanes.load(&values[corner(n, k)]); });
+        return v;
     }
     std::size_t bytes() const
     {

@@ -11,7 +11,7 @@ namespace testbed
 /// Nodes start with the bodies' velocity at their own position, weighted by the mass that each body gives them.
 /// @param sums of the bins, four numbers for each block, the first of which is the mass
 template <int S>
-void set_initial_velocity(LpfdmGrid& grid, const Scene& scene, const std::vector<Body>& bodies, const std::vector<double>& sums)
+void set_initial_velocity(LpfdmGrid<2>& grid, const Scene& scene, const std::vector<Body>& bodies, const std::vector<double>& sums)
 {
     std::vector<double> mass(grid.lattice.nodes(), 0.0);
     std::size_t block = 0;
@@ -20,26 +20,24 @@ void set_initial_velocity(LpfdmGrid& grid, const Scene& scene, const std::vector
         std::optional<VectorExpression> velocity;
         if (scene.bodies[b].velocity)
             velocity.emplace(*scene.bodies[b].velocity, scene.expression_constants());
-        for (const Bin& bin : bodies[b].bins.list())
-            for (int k = 0; k < S * S; ++k, ++block)
-                for (int corner = 0; corner < 4; ++corner)
+        for (const Bin<2>& bin : bodies[b].bins.list())
+            for (int k = 0; k < block_size<S, 2>; ++k, ++block)
+                for (std::size_t corner = 0; corner < 4; ++corner)
                 {
-                    const std::size_t n = grid.corner(grid.lattice.node(bin.i + k % S, bin.j + k / S), corner);
-                    const Vec2 x = grid.lattice.node_position(n);
+                    const std::size_t n = grid.corner(grid.lattice.node(bin.at + block_index<S, 2>(k)), corner);
+                    const Vec<2> x = grid.lattice.node_position(n);
                     const double m = 0.25 * sums[block * 4];
                     mass[n] += m;
                     if (!velocity)
                         continue;
-                    const Vec2 v = (*velocity)({x[0], x[1], x[0], x[1], 0});
-                    grid.nodes.vx[n] += m * v[0];
-                    grid.nodes.vy[n] += m * v[1];
+                    const Vec<2> v = (*velocity)({x[0], x[1], x[0], x[1], 0});
+                    for (std::size_t d = 0; d < 2; ++d)
+                        grid.nodes.v[d][n] += m * v[d];
                 }
     }
     for (const auto n : grid.nodes.active())
         if (mass[n] > 0)
-        {
-            grid.nodes.vx[n] /= mass[n];
-            grid.nodes.vy[n] /= mass[n];
-        }
+            for (auto& component : grid.nodes.v)
+                component[n] /= mass[n];
 }
 }  // namespace testbed

@@ -30,7 +30,7 @@ public:
         }
         for (Body& body : bodies_)
         {
-            const Points& q = body.points;
+            const Points<2>& q = body.points;
             wave_speed_ = std::max(wave_speed_, wave_speed(body.material, q));
             if (options_.volume_cap > 0)
                 body.counted_volume = options_.volume_cap * q.initial_volume;
@@ -50,7 +50,7 @@ public:
                    [&]
                    {
                        cloud_.nonlocal->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
-                                                                [&](int i, int j) { return grid_.lattice.cell(i, j); });
+                                                                [&](const Index<2>& at) { return grid_.lattice.cell(at); });
                    });
         timer_("cell averages (7)(8)", [&] { cell_averages(grid_, sums_.all()); });
         timer_("nodal forces (9)(10)", [&] { nodal_forces(grid_); });
@@ -67,7 +67,7 @@ public:
             timer_("hourglass",
                    [&]
                    {
-                       const double power = resist_hourglass(grid_, hourglass_rate(), hourglass_x_, hourglass_y_);
+                       const double power = resist_hourglass(grid_, hourglass_rate(), hourglass_);
                        node_ops_.note_hourglass((1 - 2 * hourglass_rate() * step.kick()) * power);  // half of the decay is then done
                    });
         this->apply_loads("node operations (11)(15)", grid_.lattice, nodes_, step);
@@ -111,27 +111,31 @@ public:
         return point_motion_of(bodies_, [&](std::size_t body, std::size_t p) { return Lpfdm::velocity(body, p); });
     }
     std::optional<NodalWork> work() const override { return node_ops_.work(nodes_, this->lag()); }
-    std::pair<const Lattice*, const Nodes*> nodes() const override { return {&grid_.lattice, &nodes_}; }
+    std::pair<const Lattice<2>*, const Nodes<2>*> nodes() const override { return {&grid_.lattice, &nodes_}; }
 
     /// Bilinear, as eq. (6) moves the point.
-    Vec2 velocity(std::size_t body, std::size_t p) const override
+    Vec<2> velocity(std::size_t body, std::size_t p) const override
     {
-        const Points& q = bodies_[body].points;
-        const double cx = (q.x[p] - grid_.lattice.origin[0]) / grid_.lattice.cell_size,
-                     cy = (q.y[p] - grid_.lattice.origin[1]) / grid_.lattice.cell_size;
-        if (!(cx >= 0 && cx < grid_.lattice.nx && cy >= 0 && cy < grid_.lattice.ny))
-            return {0, 0};
-        const int i = static_cast<int>(cx), j = static_cast<int>(cy);
-        if (!grid_.lattice.has_node(i, j) || !grid_.lattice.has_node(i + 1, j + 1))
-            return {0, 0};
-        const double a = cx - i, b = cy - j;
-        Vec2 v{0, 0};
-        for (int k = 0; k < 4; ++k)
+        const Lattice<2>& lattice = grid_.lattice;
+        Index<2> cell;
+        Vec<2> share;
+        for (std::size_t d = 0; d < 2; ++d)
         {
-            const std::size_t n = grid_.corner(grid_.lattice.node(i, j), k);
-            const double w = ((k & 1) ? a : 1 - a) * ((k & 2) ? b : 1 - b);
-            v[0] += w * nodes_.vx[n];
-            v[1] += w * nodes_.vy[n];
+            const double place = (bodies_[body].points.x[d][p] - lattice.origin[d]) / lattice.cell_size;
+            if (!(place >= 0 && place < lattice.size[d]))
+                return {0, 0};
+            cell[d] = static_cast<int>(place);
+            share[d] = place - cell[d];
+        }
+        if (!lattice.has_node(cell) || !lattice.has_node(cell + all<2>(1)))
+            return {0, 0};
+        Vec<2> v{0, 0};
+        for (std::size_t k = 0; k < 4; ++k)
+        {
+            const std::size_t n = grid_.corner(lattice.node(cell), k);
+            const double w = (is_upper(k, 0) ? share[0] : 1 - share[0]) * (is_upper(k, 1) ? share[1] : 1 - share[1]);
+            for (std::size_t d = 0; d < 2; ++d)
+                v[d] += w * nodes_.v[d][n];
         }
         return v;
     }
@@ -140,8 +144,8 @@ public:
     std::size_t active_cells() const override { return grid_.gather.active().size(); }
     std::size_t bytes() const override
     {
-        const std::size_t numbers = frontier_.mass_before.capacity() + hourglass_x_.capacity() + hourglass_y_.capacity() +
-                                    cell_weight_.capacity() + 2 * cell_force_.capacity();
+        const std::size_t numbers =
+            frontier_.mass_before.capacity() + 2 * hourglass_[0].capacity() + cell_weight_.capacity() + 2 * cell_force_.capacity();
         return this->bytes_of_points_and_loads() + grid_.bytes() + sums_.bytes() + mid_steps_.bytes() + (faces_ ? faces_->bytes() : 0) +
                numbers * sizeof(double);
     }
@@ -162,33 +166,32 @@ private:
     template <class Archive>
     void state(Archive& a)
     {
-        const Lattice lattice = this->state_of_points(a, grid_.lattice);
+        const Lattice<2> lattice = this->state_of_points(a, grid_.lattice);
         if constexpr (Archive::reads)
             rebuild_as_read(lattice);
-        std::vector<NodeIndex> at;
+        std::vector<Index<2>> at;
         for (const auto n : nodes_.active())
-            at.push_back({lattice.node_i(n), lattice.node_j(n)});
+            at.push_back(lattice.node_index(n));
         a.group("node",
                 [&]
                 {
-                    a.column("i", "-", at, &NodeIndex::i);
-                    a.column("j", "-", at, &NodeIndex::j);
-                    a.nodal("velocity_x", "m/s", lattice, at, nodes_.vx);
-                    a.nodal("velocity_y", "m/s", lattice, at, nodes_.vy);
+                    a.indices(at);
+                    for (std::size_t d = 0; d < 2; ++d)
+                        a.nodal(Components<2>::velocity[d], "m/s", lattice, at, nodes_.v[d]);
                     a.nodal("mass_before", "kg/m", lattice, at, frontier_.mass_before);
                 });
     }
 
     /// After bodies were read: cells and nodes in use, and the sums, as they were; all nodal values are zero.
-    void rebuild_as_read(const Lattice& lattice)
+    void rebuild_as_read(const Lattice<2>& lattice)
     {
         if (lattice.numbered != grid_.lattice.numbered)
             renumber(lattice);
         nodes_.clear();
         std::fill(frontier_.mass_before.begin(), frontier_.mass_before.end(), 0.0);
-        std::fill(hourglass_x_.begin(), hourglass_x_.end(), 0.0);
-        std::fill(hourglass_y_.begin(), hourglass_y_.end(), 0.0);
-        grid_.rebuild<S>(cloud_.bins());
+        for (auto& component : hourglass_)
+            std::fill(component.begin(), component.end(), 0.0);
+        grid_.template rebuild<S>(cloud_.bins());
         frontier_.left.clear();
         gradients_over_ = 0;
         sums_.update(grid_.lattice, bodies_);
@@ -202,18 +205,18 @@ private:
             sums_.update_changed(grid_.lattice, bodies_);
             return false;
         }
-        const std::vector<const Bins*> bins = cloud_.bins();
-        if (const Lattice lattice = with_numbers_for<S>(grid_.lattice, bins); lattice.numbered != grid_.lattice.numbered)
+        const std::vector<const Bins<2>*> bins = cloud_.bins();
+        if (const Lattice<2> lattice = with_numbers_for<S, 2>(grid_.lattice, bins); lattice.numbered != grid_.lattice.numbered)
             renumber(lattice);
         if (options_.hourglass > 0)
             for (const auto c : grid_.gather.active())  // the nodes around a cell that goes out of use may stay
-                hourglass_x_[c] = hourglass_y_[c] = 0;
-        frontier_.left = grid_.rebuild<S>(bins);
+                set(hourglass_, c, {0, 0});
+        frontier_.left = grid_.template rebuild<S>(bins);
         sums_.update(grid_.lattice, bodies_);
         return true;
     }
 
-    void restrain() { node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy); }
+    void restrain() { node_ops_.restrain(grid_.lattice, nodes_, nodes_.v); }
 
     void move_all_points(double dt)
     {
@@ -232,14 +235,14 @@ private:
     void find_weight() override
     {
         weight_->nodes.assign(nodes_.mass.size(), 0.0);
-        weight_->template collect<4>(bodies_, grid_.gather, sums_.all(), S * S,
+        weight_->template collect<4>(bodies_, grid_.gather, sums_.all(), block_size<S, 2>,
                                      [&](std::size_t c, double mass) { cell_weight_[c] = mass; });
         for (const auto c : grid_.gather.active())
-            for (int k = 0; k < 4; ++k)
+            for (std::size_t k = 0; k < 4; ++k)
                 weight_->nodes[grid_.corner(grid_.first_node(c), k)] += 0.25 * cell_weight_[c];
     }
 
-    void renumber(const Lattice& to)
+    void renumber(const Lattice<2>& to)
     {
         testbed::renumber(frontier_.mass_before, grid_.lattice, to);
         grid_.renumber(to);
@@ -254,10 +257,8 @@ private:
         if (cloud_.nonlocal)
             cloud_.nonlocal->resize(to.cell_stride(), to.cells());
         if (options_.hourglass > 0)
-        {
-            hourglass_x_.assign(to.cells(), 0.0);
-            hourglass_y_.assign(to.cells(), 0.0);
-        }
+            for (auto& component : hourglass_)
+                component.assign(to.cells(), 0.0);
     }
 
     /// Eq. (13), for the step that led here; there is none at the start.
@@ -283,25 +284,23 @@ private:
         body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
                                              [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
         for (const auto n : nodes_.active())
-            for (int k = 0; k < 4; ++k)
+            for (std::size_t k = 0; k < 4; ++k)
                 if (const std::size_t c = grid_.around(grid_.first_cell(n), k); grid_.cells.mass[c] > 0)
-                {
-                    nodes_.fx[n] += 0.25 * cell_force_[c][0];
-                    nodes_.fy[n] += 0.25 * cell_force_[c][1];
-                }
+                    for (std::size_t d = 0; d < 2; ++d)
+                        nodes_.f[d][n] += 0.25 * cell_force_[c][d];
     }
 
-    LpfdmGrid grid_;
-    Nodes& nodes_ = grid_.nodes;
+    LpfdmGrid<2> grid_;
+    Nodes<2>& nodes_ = grid_.nodes;
     Frontier frontier_;
     LpfdmSpec options_;
     StrainIncrement increment_;
-    MidSteps mid_steps_;                             ///< empty for points without a box
-    LpfdmSums<Support> sums_;                        ///< up to date from the end of a step on, but for bins that points left
-    std::vector<double> hourglass_x_, hourglass_y_;  ///< empty unless the scene has them
-    std::vector<Vec2> cell_force_;                   ///< so, too
-    std::vector<double> cell_weight_;                ///< so, too
-    std::optional<FreeFaces> faces_;                 ///< so, too
+    MidSteps mid_steps_;               ///< empty for points without a box
+    LpfdmSums<Support> sums_;          ///< up to date from the end of a step on, but for bins that points left
+    VectorField<2> hourglass_;         ///< empty unless the scene has them
+    std::vector<Vec<2>> cell_force_;   ///< so, too
+    std::vector<double> cell_weight_;  ///< so, too
+    std::optional<FreeFaces> faces_;   ///< so, too
     double wave_speed_ = 0;
     double gradients_over_ = 0;  ///< the step over which the cells hold the gradients of the present velocity; 0: none
 };

@@ -17,7 +17,8 @@ namespace testbed
 /// - stiffness in motion: the lattice sees waves of a moving body at other frequencies, and near its limit some grow.
 /// - convection: the departure point lies in a cell around the node.
 /// @param hourglass_rate chi c_p / L, zero without [1/s] @param alpha of local damping
-inline std::vector<StepLimit> lpfdm_step_limits(const LpfdmGrid& grid, const std::vector<Body>& bodies, double hourglass_rate, double alpha)
+inline std::vector<StepLimit> lpfdm_step_limits(const LpfdmGrid<2>& grid, const std::vector<Body>& bodies, double hourglass_rate,
+                                                double alpha)
 {
     constexpr double in_motion = 0.65, rest = 0.01;  // of L / c_p, measured: docs/methods.md; Courant number of what is at rest
     const double stiffness = isolated_cell_limit(bodies, grid.lattice.cell_size) * damping_factor(alpha);
@@ -29,7 +30,7 @@ inline std::vector<StepLimit> lpfdm_step_limits(const LpfdmGrid& grid, const std
         limits.push_back({"hourglass", 0.5 / (hourglass_rate * (1 + alpha))});
     const auto& active = grid.nodes.active();
     const double speed = parallel_max(active.size(), [&](std::size_t a)
-                                      { return std::max(std::abs(grid.nodes.vx[active[a]]), std::abs(grid.nodes.vy[active[a]])); });
+                                      { return std::max(std::abs(grid.nodes.v[0][active[a]]), std::abs(grid.nodes.v[1][active[a]])); });
     if (speed * stiffness > rest * grid.lattice.cell_size)
         limits.push_back({"stiffness in motion", in_motion * crossing * stiffness});
     if (const auto courant = courant_limit(grid.lattice.cell_size, speed))
@@ -39,7 +40,7 @@ inline std::vector<StepLimit> lpfdm_step_limits(const LpfdmGrid& grid, const std
 
 /// The points of a bin with the (S+1)^2 nodes of its cells are an element.
 template <class Support>
-ElementSystem lpfdm_elements(const Lattice& lattice, const std::vector<Body>& bodies, double hourglass_rate)
+ElementSystem lpfdm_elements(const Lattice<2>& lattice, const std::vector<Body>& bodies, double hourglass_rate)
 {
     constexpr int S = Support::S, N = S + 1;
     constexpr std::size_t n = N * N, m = 2 * n;
@@ -47,24 +48,24 @@ ElementSystem lpfdm_elements(const Lattice& lattice, const std::vector<Body>& bo
     const double slope = 1 / (2 * lattice.cell_size);
     for (const Body& body : bodies)
     {
-        const Points& q = body.points;
+        const Points<2>& q = body.points;
         const ElasticModuli& law = moduli(body.material);
-        for (const Bin& bin : body.bins.list())
+        for (const Bin<2>& bin : body.bins.list())
         {
             std::array<std::uint32_t, n> node;
             for (int k = 0; k < N * N; ++k)
-                node[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(lattice.node(bin.i + k % N, bin.j + k / N));
+                node[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(lattice.node(bin.at + block_index<N, 2>(k)));
             system.add_element(node);
             const BinFrame frame(lattice, bin);
             for (std::size_t p = bin.begin; p < bin.end; ++p)
             {
                 const SomeLanes one(1);
-                const Corner c = frame.corner<Support>(q, p, one);
-                const Weights<Support> weights(c);
+                const Corner<2> c = frame.template corner<Support>(q, p, one);
+                const Weights<Support, 2> weights(c);
                 std::array<double, m> xx{}, yy{}, shear{};
                 for (int cell = 0; cell < S * S; ++cell)
                 {
-                    const double w = weights.x[cell % S][0] * weights.y[cell / S][0];
+                    const double w = weights.along[0][cell % S][0] * weights.along[1][cell / S][0];
                     std::array<double, m> pattern_x{}, pattern_y{};
                     for (int k = 0; k < 4; ++k)
                     {

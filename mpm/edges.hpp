@@ -3,7 +3,7 @@
 /// it, twice to the first and minus once to the second, as a linear field asks. Within half a cell of the edge the shapes
 /// are then linear: positive, still of sum one, exact for linear fields, and the node on the edge alone counts on the edge.
 
-#include "core/lattice/grid.hpp"
+#include "core/lattice/lattice.hpp"
 
 namespace testbed
 {
@@ -11,28 +11,21 @@ class LatticeEdges
 {
 public:
     /// Notes which of the active nodes lie beyond an edge.
-    void rebuild(const Lattice& lattice, const std::vector<std::uint32_t>& active)
+    void rebuild(const Lattice<2>& lattice, const std::vector<std::uint32_t>& active)
     {
         beyond_.clear();
         const auto add = [&](std::size_t outer, std::size_t edge, std::size_t inner) { beyond_.push_back({outer, edge, inner}); };
-        for (const auto n : active)
-        {
-            const int i = lattice.node_i(n), j = lattice.node_j(n);
-            if (i < 0)
-                add(n, lattice.node(0, j), lattice.node(1, j));
-            else if (i > lattice.nx)
-                add(n, lattice.node(lattice.nx, j), lattice.node(lattice.nx - 1, j));
-        }
-        for (const auto n : active)  // what the corners gave to the lines beyond the lower and upper edge goes on from there
-        {
-            const int i = lattice.node_i(n), j = lattice.node_j(n);
-            if (i < 0 || i > lattice.nx)
-                continue;
-            if (j < 0)
-                add(n, lattice.node(i, 0), lattice.node(i, 1));
-            else if (j > lattice.ny)
-                add(n, lattice.node(i, lattice.ny), lattice.node(i, lattice.ny - 1));
-        }
+        for (std::size_t d = 0; d < 2; ++d)  // what the corners gave to lines beyond the next edge goes on from there
+            for (const auto n : active)
+            {
+                const Index<2> at = lattice.node_index(n);
+                if (!is_beyond(lattice, at, d) || (d > 0 && is_beyond(lattice, at, 0)))
+                    continue;
+                Index<2> edge = at, inner = at;
+                edge[d] = at[d] < 0 ? 0 : lattice.size[d];
+                inner[d] = at[d] < 0 ? 1 : lattice.size[d] - 1;
+                add(n, lattice.node(edge), lattice.node(inner));
+            }
     }
 
     /// Gives what was summed with the shapes of nodes beyond the edge to those behind it. Idempotent.
@@ -62,6 +55,8 @@ public:
     std::size_t bytes() const { return beyond_.capacity() * sizeof(Beyond); }
 
 private:
+    static bool is_beyond(const Lattice<2>& lattice, const Index<2>& at, std::size_t d) { return at[d] < 0 || at[d] > lattice.size[d]; }
+
     struct Beyond
     {
         std::size_t outer, edge, inner;

@@ -13,31 +13,31 @@ namespace testbed
 template <class Shape>
 struct MpmGrid
 {
-    static constexpr int S = Shape::S;
+    static constexpr int S = Shape::S, dim = Body::dim;
     static constexpr bool reaches_beyond = Shape::reaches_beyond;  ///< the lattice's edge
     static_assert(!reaches_beyond || Shape::S == 3, "LatticeEdges folds quadratic B-splines");
 
-    Lattice lattice;
-    Nodes nodes;
+    Lattice<dim> lattice;
+    Nodes<dim> nodes;
     Gather gather;       ///< from points to nodes
     LatticeEdges edges;  ///< empty where shapes end at the edge
     SmallNodes small;    ///< empty unless a node has too little mass to count
     double least_mass;   ///< of a node that counts [kg/m]
 
-    MpmGrid(const Lattice& l, double least) : lattice(l), nodes(l.nodes()), gather(l.nodes()), least_mass(least) {}
+    MpmGrid(const Lattice<dim>& l, double least) : lattice(l), nodes(l.nodes()), gather(l.nodes()), least_mass(least) {}
 
     /// The nodes that bins touch.
-    void find_nodes(const std::vector<const Bins*>& bins)
+    void find_nodes(const std::vector<const Bins<dim>*>& bins)
     {
-        gather.template rebuild<S>(bins, [&](int i, int j) { return lattice.node(i, j); });
+        gather.template rebuild<S, dim>(bins, [&](const Index<dim>& at) { return lattice.node(at); });
         for (const auto n : nodes.active())  // what is left must not be taken for soil
-            nodes.mass[n] = nodes.vx[n] = nodes.vy[n] = nodes.fx[n] = nodes.fy[n] = 0;
+            nodes.clear(n);
         nodes.set_active(gather.active());
         if constexpr (reaches_beyond)
             edges.rebuild(lattice, nodes.active());
     }
 
-    void renumber(const Lattice& to)
+    void renumber(const Lattice<dim>& to)
     {
         nodes.renumber(lattice, to);
         gather = Gather(to.nodes());
@@ -56,22 +56,20 @@ struct MpmGrid
                                    if constexpr (what != Scatter::force)
                                    {
                                        nodes.mass[i] = s[0];
-                                       nodes.vx[i] = s[1];
-                                       nodes.vy[i] = s[2];
+                                       for (std::size_t d = 0; d < dim; ++d)
+                                           nodes.v[d][i] = s[1 + d];
                                        if constexpr (!reaches_beyond)
                                            to_velocity(i, has_small);
                                    }
                                    if constexpr (what != Scatter::momentum)
-                                   {
-                                       nodes.fx[i] = s[Q - 2];
-                                       nodes.fy[i] = s[Q - 1];
-                                   }
+                                       for (std::size_t d = 0; d < dim; ++d)
+                                           nodes.f[d][i] = s[Q - dim + d];
                                });
         if constexpr (reaches_beyond && what != Scatter::force)
         {
             edges.fold_mass(nodes.mass);
-            edges.fold(nodes.vx);
-            edges.fold(nodes.vy);
+            for (auto& component : nodes.v)
+                edges.fold(component);
             parallel_for(nodes.active().size(), [&](std::size_t a) { to_velocity(nodes.active()[a], has_small); });
         }
         if constexpr (what != Scatter::force)
@@ -79,39 +77,32 @@ struct MpmGrid
     }
 
     /// Sums of nodes that do not count, and of those beyond the edge of the lattice, go to others.
-    void fold(std::vector<double>& values) const
+    void fold(VectorField<dim>& values) const
     {
-        if constexpr (reaches_beyond)
-            edges.fold(values);
-        small.fold(values);
-    }
-    void gather_forces()
-    {
-        fold(nodes.fx);
-        fold(nodes.fy);
-    }
-    /// Values of nodes that do not count, and beyond the edge of the lattice, where the shapes reach there.
-    void extend(std::vector<double>& x, std::vector<double>& y) const
-    {
-        small.extend(x);
-        small.extend(y);
-        if constexpr (reaches_beyond)
+        for (auto& component : values)
         {
-            edges.extend(x);
-            edges.extend(y);
+            if constexpr (reaches_beyond)
+                edges.fold(component);
+            small.fold(component);
+        }
+    }
+    void gather_forces() { fold(nodes.f); }
+    /// Values of nodes that do not count, and beyond the edge of the lattice, where the shapes reach there.
+    void extend(VectorField<dim>& values) const
+    {
+        for (auto& component : values)
+        {
+            small.extend(component);
+            if constexpr (reaches_beyond)
+                edges.extend(component);
         }
     }
     /// Copies the velocity of the nodes in use.
-    void keep_velocity(std::vector<double>& x, std::vector<double>& y) const
+    void keep_velocity(VectorField<dim>& to) const
     {
-        x.resize(nodes.vx.size());
-        y.resize(nodes.vy.size());
-        nodes.for_each(
-            [&](std::size_t i, const auto& lanes)
-            {
-                lanes.store(&x[i], lanes.load(&nodes.vx[i]));
-                lanes.store(&y[i], lanes.load(&nodes.vy[i]));
-            });
+        for (auto& component : to)
+            component.resize(nodes.mass.size());
+        nodes.for_each([&](std::size_t i, const auto& lanes) { store(to, i, lanes, load(nodes.v, i, lanes)); });
     }
 
     std::size_t bytes() const { return nodes.bytes() + gather.bytes() + edges.bytes() + small.bytes(); }
@@ -123,8 +114,8 @@ private:
         if (!(nodes.mass[i] > least_mass))
             return has_small.store(true, std::memory_order_relaxed);
         const double inverse = 1 / nodes.mass[i];
-        nodes.vx[i] *= inverse;
-        nodes.vy[i] *= inverse;
+        for (auto& component : nodes.v)
+            component[i] *= inverse;
     }
     /// The nodes that do not count go to their neighbours; those that have none count all the same.
     void take_small_nodes(bool has_small)
@@ -138,8 +129,8 @@ private:
             if (!(nodes.mass[n] > least_mass) && !small.has(n))
             {
                 const double inverse = inverse_mass(nodes, n);
-                nodes.vx[n] *= inverse;
-                nodes.vy[n] *= inverse;
+                for (auto& component : nodes.v)
+                    component[n] *= inverse;
             }
         small.fold_momentum(nodes);
     }

@@ -52,7 +52,7 @@ void check(const Scene& scene, Problems& problems)
 void warn(const Scene& scene, Problems& problems)
 {
     const auto& mpm = scene.options<MpmSpec>();
-    const auto inside = [&](const Vec2& low, const Vec2& high)
+    const auto inside = [&](const Vec<2>& low, const Vec<2>& high)
     {
         const double slack = 1e-6 * scene.grid.cell_size;
         bool is_inside = true;

@@ -27,7 +27,7 @@ inline Eigen::Matrix<double, 4, 2> solve_projection(const Eigen::Matrix4d& gram,
 
 /// The points of one bin. @tparam Shape of two nodes, not smooth
 template <class Shape>
-void filter_null_space(const BinFrame& frame, Points& q, const Bin& bin)
+void filter_null_space(const BinFrame<2>& frame, Points<2>& q, const Bin<2>& bin)
 {
     static_assert(Shape::S == 2);
     std::array<Pack, 18> total;  // upper half of the Gram matrix, row by row, and the momentum
@@ -35,21 +35,23 @@ void filter_null_space(const BinFrame& frame, Points& q, const Bin& bin)
     const auto shapes = [&](std::size_t p, const auto& lanes)
     {
         const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-        return std::array<Pack, 4>{at.value(0, 0), at.value(1, 0), at.value(0, 1), at.value(1, 1)};
+        std::array<Pack, 4> N;
+        unrolled<4>([&](auto k) { N[k] = at.template value<k>(); });
+        return N;
     };
     for_each_pack(bin.begin, bin.end,
                   [&](std::size_t p, const auto& lanes)
                   {
                       const auto N = shapes(p, lanes);
-                      const Pack vx = lanes.load(&q.vx[p]), vy = lanes.load(&q.vy[p]);
+                      const Vec<2, Pack> v = load(q.v, p, lanes);
                       std::size_t n = 0;
                       for (std::size_t i = 0; i < 4; ++i)
                       {
                           const Pack own = lanes.keep(N[i]);
                           for (std::size_t j = i; j < 4; ++j)
                               total[n++] += own * N[j];
-                          total[10 + i] += own * vx;
-                          total[14 + i] += own * vy;
+                          for (std::size_t d = 0; d < 2; ++d)
+                              total[10 + 4 * d + i] += own * v[d];
                       }
                   });
     std::array<double, 18> sums;
@@ -68,14 +70,13 @@ void filter_null_space(const BinFrame& frame, Points& q, const Bin& bin)
                   [&](std::size_t p, const auto& lanes)
                   {
                       const auto N = shapes(p, lanes);
-                      Pack vx(0.0), vy(0.0);
-                      for (int i = 0; i < 4; ++i)
+                      for (int d = 0; d < 2; ++d)
                       {
-                          vx += N[static_cast<std::size_t>(i)] * Pack(field(i, 0));
-                          vy += N[static_cast<std::size_t>(i)] * Pack(field(i, 1));
+                          Pack v(0.0);
+                          for (int i = 0; i < 4; ++i)
+                              v += N[static_cast<std::size_t>(i)] * Pack(field(i, d));
+                          lanes.store(&q.v[static_cast<std::size_t>(d)][p], v);
                       }
-                      lanes.store(&q.vx[p], vx);
-                      lanes.store(&q.vy[p], vy);
                   });
 }
 }  // namespace testbed

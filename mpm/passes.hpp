@@ -14,9 +14,9 @@ void update_velocity(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, Update& ru
 {
     using Momentum = NodeSums<Shape, Strain, Scatter::momentum>;
     cloud.for_each_bin(grid.lattice,
-                       [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+                       [&](Body& body, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_FLATTEN
                        {
-                           Points& q = body.points;
+                           Points<2>& q = body.points;
                            const auto update = rule.template in_bin<Shape::S>(grid.lattice, grid.nodes, body, bin);
                            for_each_pack(bin.begin, bin.end,
                                          [&](std::size_t p, const auto& lanes) TESTBED_INLINE
@@ -31,33 +31,26 @@ void update_velocity(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, Update& ru
 
 /// A nodal field goes to the points and back.
 template <class Shape>
-void smooth(Cloud<Shape>& cloud, MpmGrid<Shape>& grid, std::vector<double>& x, std::vector<double>& y)
+void smooth(Cloud<Shape>& cloud, MpmGrid<Shape>& grid, VectorField<2>& field)
 {
     using Smoothed = SmoothedSums<Shape>;
-    grid.extend(x, y);
+    grid.extend(field);
     cloud.for_each_bin(grid.lattice,
-                       [&](const Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+                       [&](const Body& body, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_FLATTEN
                        {
-                           Smoothed sums(grid.lattice, bin, x, y);
+                           Smoothed sums(grid.lattice, bin, field);
                            for_each_pack(bin.begin, bin.end,
                                          [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                                          { sums.add(body.points, lanes, frame.template corner<Shape>(body.points, p, lanes)); });
                            sums.write(&cloud.workspace[number * Smoothed::numbers]);
                        });
-    grid.gather.template sum<2>(cloud.workspace,
-                                [&](std::size_t i, const std::array<double, 2>& s)
-                                {
-                                    x[i] = s[0];
-                                    y[i] = s[1];
-                                });
-    grid.fold(x);
-    grid.fold(y);
+    grid.gather.template sum<2>(cloud.workspace, [&](std::size_t i, const Vec<2>& s) { set(field, i, s); });
+    grid.fold(field);
     grid.nodes.for_each(
         [&](std::size_t i, const auto& lanes)
         {
             const Pack inverse = inverse_mass(grid.nodes, i, lanes);
-            lanes.store(&x[i], lanes.load(&x[i]) * inverse);
-            lanes.store(&y[i], lanes.load(&y[i]) * inverse);
+            unrolled<2>([&](auto d) { lanes.store(&field[d][i], lanes.load(&field[d][i]) * inverse); });
         });
 }
 
@@ -66,11 +59,11 @@ template <class Strain, class Shape>
 void update_stress(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIncrement& increment, double dt)
 {
     cloud.for_each_bin_with_law(grid.lattice,
-                                [&](Body& body, const auto& law, const Bin& bin, std::size_t, const BinFrame& frame)
+                                [&](Body& body, const auto& law, const Bin<2>& bin, std::size_t, const BinFrame<2>& frame)
                                 {
-                                    Points& q = body.points;
+                                    Points<2>& q = body.points;
                                     const typename Strain::template InBin<Shape> strain(grid.lattice, q, bin);
-                                    const NodalVelocity<Shape::S> v(grid.lattice, bin, grid.nodes.vx, grid.nodes.vy);
+                                    const NodalVelocity<Shape::S> v(grid.lattice, bin, grid.nodes.v);
                                     for_each_pack(bin.begin, bin.end,
                                                   [&](std::size_t p, const auto& lanes)
                                                   {
@@ -84,45 +77,43 @@ void update_stress(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const Strain
 /// sums of the bins for the next step.
 /// @param sums of the bins, numbers for each, or null if the stress came first
 template <class Strain, bool with_stress, class Shape>
-void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIncrement& increment, const std::vector<double>& carrier_x,
-                 const std::vector<double>& carrier_y, double dt, double* sums)
+void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIncrement& increment, const VectorField<2>& carrier_velocity,
+                 double dt, double* sums)
 {
     using Sums = NodeSums<Shape, Strain, Scatter::momentum_and_force>;
-    cloud.for_each_bin_with_law(grid.lattice,
-                                [&](Body& body, const auto& law, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
-                                {
-                                    Points& q = body.points;
-                                    const typename Strain::template InBin<Shape> strain(grid.lattice, q, bin);
-                                    const NodalVelocity<Shape::S> carrier(grid.lattice, bin, carrier_x, carrier_y),
-                                        v(grid.lattice, bin, grid.nodes.vx, grid.nodes.vy);
-                                    bool left = false;
-                                    for_each_pack(bin.begin, bin.end,
-                                                  [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                                                  {
-                                                      const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                                                      const Gradient<Pack> d = increment.of(v.template gradient<Strain>(at, strain, dt));
-                                                      if constexpr (with_stress)
-                                                          law.update(q, p, lanes, d);
-                                                      stretch<Shape>(q, p, lanes, increment, d);
-                                                      const auto step = carrier.at(at);
-                                                      const Pack x = lanes.load(&q.x[p]) + step[0] * Pack(dt),
-                                                                 y = lanes.load(&q.y[p]) + step[1] * Pack(dt);
-                                                      lanes.store(&q.x[p], x);
-                                                      lanes.store(&q.y[p], y);
-                                                      if constexpr (!with_stress)
-                                                          left |= stdx::any_of(frame.template left<Shape>(
-                                                              q, p, lanes, frame.template corner<Shape>(q, p, lanes, x, y)));
-                                                  });
-                                    if constexpr (with_stress)
-                                        left |= sum_bin<Shape, Sums>(grid.lattice, body, bin, sums + number * Sums::numbers);
-                                    if (left)
-                                        body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
-                                });
+    cloud.for_each_bin_with_law(
+        grid.lattice,
+        [&](Body& body, const auto& law, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_FLATTEN
+        {
+            Points<2>& q = body.points;
+            const typename Strain::template InBin<Shape> strain(grid.lattice, q, bin);
+            const NodalVelocity<Shape::S> carrier(grid.lattice, bin, carrier_velocity), v(grid.lattice, bin, grid.nodes.v);
+            bool left = false;
+            for_each_pack(bin.begin, bin.end,
+                          [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                          {
+                              const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
+                              const Gradient<2, Pack> d = increment.of(v.template gradient<Strain>(at, strain, dt));
+                              if constexpr (with_stress)
+                                  law.update(q, p, lanes, d);
+                              stretch<Shape>(q, p, lanes, increment, d);
+                              Vec<2, Pack> x = carrier.at(at);
+                              unrolled<2>([&](auto i) TESTBED_INLINE { x[i] = lanes.load(&q.x[i][p]) + x[i] * Pack(dt); });
+                              store(q.x, p, lanes, x);
+                              if constexpr (!with_stress)
+                                  left |=
+                                      stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x)));
+                          });
+            if constexpr (with_stress)
+                left |= sum_bin<Shape, Sums>(grid.lattice, body, bin, sums + number * Sums::numbers);
+            if (left)
+                body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
+        });
 }
 
 /// Whether a point of a bin has left it.
 template <class Shape>
-bool any_left(const Points& q, const Bin& bin, const BinFrame& frame)
+bool any_left(const Points<2>& q, const Bin<2>& bin, const BinFrame<2>& frame)
 {
     bool left = false;
     for_each_pack(bin.begin, bin.end,

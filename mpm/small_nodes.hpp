@@ -5,7 +5,7 @@
 /// the share of mass that is handed over. The classical cut-off (Sulsky, Zhou & Schreyer 1995) leaves the force of the node out instead,
 /// and with it momentum.
 
-#include "core/lattice/grid.hpp"
+#include "core/lattice/nodes.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -17,7 +17,7 @@ class SmallNodes
 {
 public:
     /// Finds the active nodes of the lattice with at most `least` mass [kg/m] that have a neighbour with more.
-    void find(const Lattice& lattice, const Nodes& nodes, double least)
+    void find(const Lattice<2>& lattice, const Nodes<2>& nodes, double least)
     {
         list_.clear();
         masters_.clear();
@@ -25,10 +25,8 @@ public:
         {
             if (nodes.mass[n] > least)
                 continue;
-            const int i = lattice.node_i(n), j = lattice.node_j(n);
-            if (i < 0 || j < 0 || i > lattice.nx || j > lattice.ny)
-                continue;  // beyond the edge: not a node of its own
-            add(lattice, nodes, least, {i, j}, n);
+            if (const Index<2> at = lattice.node_index(n); is_on(lattice, at))  // beyond the edge: not a node of its own
+                add(lattice, nodes, least, at, n);
         }
     }
     void clear() { list_.clear(); }
@@ -39,7 +37,7 @@ public:
     }
 
     /// Mass and momentum, where nodes above `least` hold a velocity and the others a momentum; then all hold a velocity.
-    void fold_momentum(Nodes& nodes) const
+    void fold_momentum(Nodes<2>& nodes) const
     {
         for (const Small& s : list_)
         {
@@ -47,14 +45,14 @@ public:
                         [&](const Master& m)
                         {
                             const double given = m.share * nodes.mass[s.node], mass = nodes.mass[m.node] + given;
-                            nodes.vx[m.node] = (nodes.vx[m.node] * nodes.mass[m.node] + m.share * nodes.vx[s.node]) / mass;
-                            nodes.vy[m.node] = (nodes.vy[m.node] * nodes.mass[m.node] + m.share * nodes.vy[s.node]) / mass;
+                            for (auto& v : nodes.v)
+                                v[m.node] = (v[m.node] * nodes.mass[m.node] + m.share * v[s.node]) / mass;
                             nodes.mass[m.node] = mass;
                         });
             nodes.mass[s.node] = 0;
         }
-        extend(nodes.vx);
-        extend(nodes.vy);
+        for (auto& v : nodes.v)
+            extend(v);
     }
     /// Hands sums of small nodes, such as forces, to their neighbours. Idempotent.
     void fold(std::vector<double>& sums) const
@@ -88,21 +86,28 @@ private:
         double share;
     };
 
-    void add(const Lattice& lattice, const Nodes& nodes, double least, const NodeIndex& at, std::uint32_t n)
+    static bool is_on(const Lattice<2>& lattice, const Index<2>& at)
+    {
+        for (std::size_t d = 0; d < 2; ++d)
+            if (at[d] < 0 || at[d] > lattice.size[d])
+                return false;
+        return true;
+    }
+    void add(const Lattice<2>& lattice, const Nodes<2>& nodes, double least, const Index<2>& at, std::uint32_t n)
     {
         const auto first = static_cast<std::uint32_t>(masters_.size());
         double total = 0;
-        for (int j = std::max(at.j - 1, 0); j <= std::min(at.j + 1, lattice.ny); ++j)
-            for (int i = std::max(at.i - 1, 0); i <= std::min(at.i + 1, lattice.nx); ++i)
-            {
-                if (!lattice.has_node(i, j))
-                    continue;
-                const std::size_t m = lattice.node(i, j);
-                if (!(nodes.mass[m] > least))
-                    continue;
-                masters_.push_back({static_cast<std::uint32_t>(m), nodes.mass[m]});
-                total += nodes.mass[m];
-            }
+        for_each_index(at + all<2>(-1), at + all<2>(2),
+                       [&](const Index<2>& near)
+                       {
+                           if (!is_on(lattice, near) || !lattice.has_node(near))
+                               return;
+                           const std::size_t m = lattice.node(near);
+                           if (!(nodes.mass[m] > least))
+                               return;
+                           masters_.push_back({static_cast<std::uint32_t>(m), nodes.mass[m]});
+                           total += nodes.mass[m];
+                       });
         for (std::size_t m = first; m < masters_.size(); ++m)
             masters_[m].share /= total;
         if (masters_.size() > first)

@@ -33,9 +33,10 @@ public:
             timer_("bins", [&] { rebuild(); });
         if (cloud_.nonlocal)
             timer_("nonlocal strain",
-                   [&] {
+                   [&]
+                   {
                        cloud_.nonlocal->template apply<Shape>(grid_.lattice, bodies_, grid_.gather,
-                                                              [&](int i, int j) { return grid_.lattice.node(i, j); });
+                                                              [&](const Index<2>& at) { return grid_.lattice.node(at); });
                    });
         if (options_.scheme == MpmSpec::Scheme::usf)
             stress_first(step);
@@ -66,20 +67,18 @@ public:
             timer_("remap velocity",
                    [&]
                    {
-                       grid_.keep_velocity(carrier_x_, carrier_y_);
+                       grid_.keep_velocity(carrier_);
                        grid_.template to_nodes<Scatter::momentum>(cloud_.workspace);
-                       node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy, false);
-                       grid_.extend(nodes_.vx, nodes_.vy);
+                       node_ops_.restrain(grid_.lattice, nodes_, nodes_.v, false);
+                       grid_.extend(nodes_.v);
                    });
-            timer_("points, material",
-                   [&] { move_points<Strain, true>(cloud_, grid_, increment_, carrier_x_, carrier_y_, dt, sums_.of(0)); });
+            timer_("points, material", [&] { move_points<Strain, true>(cloud_, grid_, increment_, carrier_, dt, sums_.of(0)); });
             break;
         case MpmSpec::Scheme::usl:
-            timer_("points, material",
-                   [&] { move_points<Strain, true>(cloud_, grid_, increment_, nodes_.vx, nodes_.vy, dt, sums_.of(0)); });
+            timer_("points, material", [&] { move_points<Strain, true>(cloud_, grid_, increment_, nodes_.v, dt, sums_.of(0)); });
             break;
         case MpmSpec::Scheme::usf:
-            timer_("points", [&] { move_points<Strain, false>(cloud_, grid_, increment_, nodes_.vx, nodes_.vy, dt, nullptr); });
+            timer_("points", [&] { move_points<Strain, false>(cloud_, grid_, increment_, nodes_.v, dt, nullptr); });
             break;
         }
         if (xpic_)
@@ -106,13 +105,13 @@ public:
         work.of_strain = options_.scheme != MpmSpec::Scheme::musl && !xpic_;
         return work;
     }
-    std::pair<const Lattice*, const Nodes*> nodes() const override { return {&grid_.lattice, &nodes_}; }
-    Vec2 velocity(std::size_t body, std::size_t p) const override { return {bodies_[body].points.vx[p], bodies_[body].points.vy[p]}; }
+    std::pair<const Lattice<2>*, const Nodes<2>*> nodes() const override { return {&grid_.lattice, &nodes_}; }
+    Vec<2> velocity(std::size_t body, std::size_t p) const override { return at(bodies_[body].points.v, p); }
     std::size_t unknowns() const override { return 2 * nodes_with_mass(nodes_); }
     std::size_t active_cells() const override { return cloud_.number_of_bins(); }
     std::size_t bytes() const override
     {
-        const std::size_t numbers = carrier_x_.capacity() + carrier_y_.capacity() + mapped_x_.capacity() + mapped_y_.capacity();
+        const std::size_t numbers = 2 * (carrier_[0].capacity() + mapped_[0].capacity());
         return this->bytes_of_points_and_loads() + grid_.bytes() + sums_.bytes() + (xpic_ ? xpic_->bytes() : 0) + numbers * sizeof(double);
     }
     void write_state(StateWriter& writer) override { state(writer); }
@@ -140,13 +139,13 @@ private:
     template <class Archive>
     void state(Archive& a)
     {
-        const Lattice lattice = this->state_of_points(a, grid_.lattice);
+        const Lattice<2> lattice = this->state_of_points(a, grid_.lattice);
         if constexpr (Archive::reads)
             rebuild_as_read(lattice);
     }
 
     /// After bodies were read: nodes in use and the sums, as they were.
-    void rebuild_as_read(const Lattice& lattice)
+    void rebuild_as_read(const Lattice<2>& lattice)
     {
         if (lattice.numbered != grid_.lattice.numbered)
             renumber(lattice);
@@ -160,8 +159,8 @@ private:
         const bool other_bins = cloud_.sort();
         if (other_bins)
         {
-            const std::vector<const Bins*> bins = cloud_.bins();
-            if (const Lattice lattice = with_numbers_for<S>(grid_.lattice, bins); lattice.numbered != grid_.lattice.numbered)
+            const std::vector<const Bins<2>*> bins = cloud_.bins();
+            if (const Lattice<2> lattice = with_numbers_for<S, 2>(grid_.lattice, bins); lattice.numbered != grid_.lattice.numbered)
                 renumber(lattice);
             grid_.find_nodes(bins);
         }
@@ -191,15 +190,15 @@ private:
         {
             points_to_nodes<Scatter::momentum>();  // once more: the workspace holds forces now
             restrain_mapped_velocity();
-            weight_->template collect<sums_of<Scatter::momentum>>(bodies_, grid_.gather, cloud_.workspace, S * S, take);
+            weight_->template collect<sums_of<Scatter::momentum>>(bodies_, grid_.gather, cloud_.workspace, block_size<S, 2>, take);
         }
         else
-            weight_->template collect<sums_of<Scatter::momentum_and_force>>(bodies_, grid_.gather, sums_.all(), S * S, take);
+            weight_->template collect<sums_of<Scatter::momentum_and_force>>(bodies_, grid_.gather, sums_.all(), block_size<S, 2>, take);
         if constexpr (MpmGrid<Shape>::reaches_beyond)
             grid_.edges.fold_mass(weight_->nodes);
     }
 
-    void renumber(const Lattice& to)
+    void renumber(const Lattice<2>& to)
     {
         grid_.renumber(to);
         if (cloud_.nonlocal)
@@ -225,8 +224,8 @@ private:
         body_force_->template apply<Shape>(grid_.lattice, bodies_, grid_.gather,
                                            [&](std::size_t n, const std::array<double, 2>& f)
                                            {
-                                               nodes_.fx[n] += f[0];
-                                               nodes_.fy[n] += f[1];
+                                               for (std::size_t d = 0; d < 2; ++d)
+                                                   nodes_.f[d][n] += f[d];
                                            });
         grid_.gather_forces();
     }
@@ -234,34 +233,30 @@ private:
     void restrain_mapped_velocity()
     {
         if (!node_ops_.restrains())
-            return grid_.extend(nodes_.vx, nodes_.vy);
-        grid_.keep_velocity(mapped_x_, mapped_y_);
-        node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
-        grid_.extend(nodes_.vx, nodes_.vy);
+            return grid_.extend(nodes_.v);
+        grid_.keep_velocity(mapped_);
+        node_ops_.restrain(grid_.lattice, nodes_, nodes_.v);
+        grid_.extend(nodes_.v);
     }
 
     /// v += F / m dt; from here on the force holds the increment of the velocity.
     void accelerate_and_keep_increment(double dt)
     {
         node_ops_.kick(nodes_, dt);
-        node_ops_.restrain(grid_.lattice, nodes_, nodes_.vx, nodes_.vy);
+        node_ops_.restrain(grid_.lattice, nodes_, nodes_.v);
         if (node_ops_.restrains())
             nodes_.for_each(
                 [&](std::size_t i, const auto& lanes)
-                {
-                    lanes.store(&nodes_.fx[i], lanes.load(&nodes_.vx[i]) - lanes.load(&mapped_x_[i]));
-                    lanes.store(&nodes_.fy[i], lanes.load(&nodes_.vy[i]) - lanes.load(&mapped_y_[i]));
-                });
+                { unrolled<2>([&](auto d) { lanes.store(&nodes_.f[d][i], lanes.load(&nodes_.v[d][i]) - lanes.load(&mapped_[d][i])); }); });
         else
             nodes_.for_each(
                 [&](std::size_t i, const auto& lanes)
                 {
                     const Pack step = inverse_mass(nodes_, i, lanes) * Pack(dt);
-                    lanes.store(&nodes_.fx[i], lanes.load(&nodes_.fx[i]) * step);
-                    lanes.store(&nodes_.fy[i], lanes.load(&nodes_.fy[i]) * step);
+                    unrolled<2>([&](auto d) { lanes.store(&nodes_.f[d][i], lanes.load(&nodes_.f[d][i]) * step); });
                 });
-        grid_.extend(nodes_.vx, nodes_.vy);
-        grid_.extend(nodes_.fx, nodes_.fy);
+        grid_.extend(nodes_.v);
+        grid_.extend(nodes_.f);
     }
 
     void update_velocity(bool remap)
@@ -285,9 +280,8 @@ private:
     {
         const bool driven = node_ops_.restrains();
         make_room(cloud_.workspace, grid_.gather.blocks() * SmoothedSums<Shape>::Q);
-        xpic_->filter(nodes_, driven ? mapped_x_ : nodes_.vx, driven ? mapped_y_ : nodes_.vy,
-                      [&](std::vector<double>& x, std::vector<double>& y) { smooth(cloud_, grid_, x, y); });
-        grid_.extend(xpic_->kept_x(), xpic_->kept_y());
+        xpic_->filter(nodes_, driven ? mapped_ : nodes_.v, [&](VectorField<2>& field) { smooth(cloud_, grid_, field); });
+        grid_.extend(xpic_->kept());
         xpic_->begin_update(bodies_);
     }
     /// What XPIC took from the velocity of the points moves them, too.
@@ -295,7 +289,7 @@ private:
     {
         const bool sum = options_.scheme != MpmSpec::Scheme::usf;
         cloud_.for_each_bin(grid_.lattice,
-                            [&](Body& body, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_FLATTEN
+                            [&](Body& body, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_FLATTEN
                             {
                                 xpic_->move(body, bin, dt);
                                 if (sum ? sum_bin<Shape, Sums>(grid_.lattice, body, bin, sums_.of(number))
@@ -306,19 +300,19 @@ private:
     void filter_points()
     {
         if constexpr (!Shape::is_smooth)
-            cloud_.for_each_bin(grid_.lattice, [](Body& body, const Bin& bin, std::size_t, const BinFrame& frame)
+            cloud_.for_each_bin(grid_.lattice, [](Body& body, const Bin<2>& bin, std::size_t, const BinFrame<2>& frame)
                                 { filter_null_space<Shape>(frame, body.points, bin); });
     }
 
     MpmGrid<Shape> grid_;
-    Nodes& nodes_ = grid_.nodes;
+    Nodes<2>& nodes_ = grid_.nodes;
     using Sums = NodeSums<Shape, Strain, Scatter::momentum_and_force>;
     BinSums<Shape, Sums> sums_;  ///< up to date from the end of a step on, but for bins that points left; empty if stress comes first
     MpmSpec options_;
     StrainIncrement increment_;
     std::optional<Xpic> xpic_;
-    std::vector<double> carrier_x_, carrier_y_;
-    std::vector<double> mapped_x_, mapped_y_;  ///< empty in a scene without supports and walls
+    VectorField<2> carrier_;  ///< velocity before the remap; empty without one
+    VectorField<2> mapped_;   ///< empty in a scene without supports and walls
 };
 
 template <class Shape, class Strain>

@@ -20,7 +20,7 @@ namespace testbed
 {
 /// f(p, at, lane) for the points of a bin: the shape functions at p are the lane of `at`.
 template <class Shape, class F>
-void for_each_point(const Lattice& lattice, const Points& q, const Bin& bin, F&& f)
+void for_each_point(const Lattice<2>& lattice, const Points<2>& q, const Bin<2>& bin, F&& f)
 {
     const BinFrame frame(lattice, bin);
     for_each_pack(bin.begin, bin.end,
@@ -64,44 +64,45 @@ double eigenvalue_bound(std::array<double, n * n> a, const std::array<double, n>
     return scale * std::pow(trace, 1.0 / 16);
 }
 
+/// The largest eigenvalue of a bin's own stiffness with its own masses, for a scalar unknown: a bound, see content_limit().
+template <class Shape>
+double largest_eigenvalue_in_bin(const Lattice<2>& lattice, const Points<2>& q, const Bin<2>& bin, double kappa)
+{
+    constexpr std::size_t n = block_size<Shape::S, 2>;
+    std::array<double, n> mass{};
+    std::array<double, n * n> a{};
+    const auto add = [&](std::size_t p, const ShapeAt<Shape>& at, std::size_t lane)
+    {
+        const double v = kappa * q.current_volume(p) * stiffness_ratio(q, p);
+        std::array<Vec<2>, n> g;
+        unrolled<n>(
+            [&](auto k)
+            {
+                mass[k] += q.mass * at.template value<k>()[lane];
+                const Vec<2, Pack> gradient = at.template gradient<k>();
+                g[k] = {gradient[0][lane], gradient[1][lane]};
+            });
+        for (std::size_t k = 0; k < n; ++k)
+            for (std::size_t l = 0; l < n; ++l)
+                a[k * n + l] += v * (g[k][0] * g[l][0] + g[k][1] * g[l][1]);
+    };
+    for_each_point<Shape>(lattice, q, bin, add);
+    return eigenvalue_bound<n>(a, mass);
+}
+
 /// Limit for stress last, whatever the neighbours: the largest eigenvalue of each bin's own stiffness with its own masses (Irons), doubled
 /// for H = 0. In a bin eps : D : eps is at most kappa |grad u|^2, which leaves a scalar problem on its S x S nodes; its largest eigenvalue
 /// is bounded by the 16th root of the trace of its 16th power, at most S^(1/8) too large.
 template <class Shape>
-double content_limit(const Lattice& lattice, const std::vector<Body>& bodies)
+double content_limit(const Lattice<2>& lattice, const std::vector<Body>& bodies)
 {
-    constexpr std::size_t S = Shape::S, n = S * S;
     double largest = 0;
     for (const Body& body : bodies)
     {
-        const Points& q = body.points;
         const double kappa = gradient_stiffness(moduli(body.material));
         const auto& bins = body.bins.list();
-        largest = std::max(largest, parallel_max(bins.size(),
-                                                 [&](std::size_t b)
-                                                 {
-                                                     std::array<double, n> mass{};
-                                                     std::array<double, n * n> a{};
-                                                     for_each_point<Shape>(lattice, q, bins[b],
-                                                                           [&](std::size_t p, const ShapeAt<Shape>& at, std::size_t lane)
-                                                                           {
-                                                                               const double v =
-                                                                                   kappa * q.current_volume(p) * stiffness_ratio(q, p);
-                                                                               std::array<double, n> x, y;
-                                                                               for (std::size_t k = 0; k < n; ++k)
-                                                                               {
-                                                                                   const int i = static_cast<int>(k % S),
-                                                                                             j = static_cast<int>(k / S);
-                                                                                   mass[k] += q.mass * at.value(i, j)[lane];
-                                                                                   x[k] = at.slope_x(i, j)[lane];
-                                                                                   y[k] = at.slope_y(i, j)[lane];
-                                                                               }
-                                                                               for (std::size_t k = 0; k < n; ++k)
-                                                                                   for (std::size_t l = 0; l < n; ++l)
-                                                                                       a[k * n + l] += v * (x[k] * x[l] + y[k] * y[l]);
-                                                                           });
-                                                     return eigenvalue_bound<n>(a, mass);
-                                                 }));
+        const auto in_bin = [&](std::size_t b) { return largest_eigenvalue_in_bin<Shape>(lattice, body.points, bins[b], kappa); };
+        largest = std::max(largest, parallel_max(bins.size(), in_bin));
     }
     return 2 / std::sqrt(2 * largest);
 }
@@ -115,20 +116,20 @@ struct PointOperator
     std::array<double, 2 * n> xx{}, yy{}, shear{};
 
     template <class Strain>
-    PointOperator(const Lattice& lattice, const Bin& bin, const ShapeAt<Shape>& at, std::size_t lane, const Strain& strain)
+    PointOperator(const Lattice<2>& lattice, const Bin<2>& bin, const ShapeAt<Shape>& at, std::size_t lane, const Strain& strain)
     {
         std::array<double, S> wx, wy, gx, gy;
         for (std::size_t k = 0; k < S; ++k)
         {
-            wx[k] = at.wx[k][lane];
-            wy[k] = at.wy[k][lane];
-            gx[k] = at.gx[k][lane];
-            gy[k] = at.gy[k][lane];
+            wx[k] = at.weights[0][k][lane];
+            wy[k] = at.weights[1][k][lane];
+            gx[k] = at.slopes[0][k][lane];
+            gy[k] = at.slopes[1][k][lane];
         }
-        fold(wx, bin.i, lattice.nx);
-        fold(gx, bin.i, lattice.nx);
-        fold(wy, bin.j, lattice.ny);
-        fold(gy, bin.j, lattice.ny);
+        fold(wx, bin.at[0], lattice.size[0]);
+        fold(gx, bin.at[0], lattice.size[0]);
+        fold(wy, bin.at[1], lattice.size[1]);
+        fold(gy, bin.at[1], lattice.size[1]);
         for (std::size_t k = 0; k < n; ++k)
         {
             value[k] = wx[k % S] * wy[k / S];
@@ -137,9 +138,9 @@ struct PointOperator
             yy[2 * k + 1] = y;
             shear[2 * k] = y;
             shear[2 * k + 1] = x;
-            if constexpr (requires { strain.mean_x; })
+            if constexpr (requires { strain.mean; })
             {
-                const double dx = 0.5 * (strain.mean_x[k][0] - x), dy = 0.5 * (strain.mean_y[k][0] - y);
+                const double dx = 0.5 * (strain.mean[k][0][0] - x), dy = 0.5 * (strain.mean[k][1][0] - y);
                 xx[2 * k] += dx;
                 yy[2 * k] += dx;
                 xx[2 * k + 1] += dy;
@@ -184,7 +185,7 @@ inline constexpr double crossing_share = 0.6;
 /// - cell content, for usl: see content_limit().
 /// - motion: a point crosses at most one cell in a step.
 template <class Shape>
-std::vector<StepLimit> mpm_step_limits(const Lattice& lattice, const std::vector<Body>& bodies, const MpmSpec& options, double alpha)
+std::vector<StepLimit> mpm_step_limits(const Lattice<2>& lattice, const std::vector<Body>& bodies, const MpmSpec& options, double alpha)
 {
     const double factor = damping_factor(alpha) * std::sqrt(0.5 * (1 + options.flip));
     std::vector<StepLimit> limits;
@@ -203,7 +204,7 @@ std::vector<StepLimit> mpm_step_limits(const Lattice& lattice, const std::vector
     double speed = 0;
     for (const Body& body : bodies)
         speed = std::max(speed, parallel_max(body.points.count, [&](std::size_t p)
-                                             { return std::max(std::abs(body.points.vx[p]), std::abs(body.points.vy[p])); }));
+                                             { return std::max(std::abs(body.points.v[0][p]), std::abs(body.points.v[1][p])); }));
     if (const auto courant = courant_limit(lattice.cell_size, speed))
         limits.push_back({"motion", *courant});
     return limits;
@@ -211,19 +212,19 @@ std::vector<StepLimit> mpm_step_limits(const Lattice& lattice, const std::vector
 
 /// The points of a bin with its S x S nodes are an element.
 template <class Shape, class Strain>
-ElementSystem mpm_elements(const Lattice& lattice, const std::vector<Body>& bodies)
+ElementSystem mpm_elements(const Lattice<2>& lattice, const std::vector<Body>& bodies)
 {
     constexpr int S = Shape::S;
     constexpr std::size_t n = S * S;
     ElementSystem system(n, lattice.nodes());
     for (const Body& body : bodies)
     {
-        const Points& q = body.points;
-        for (const Bin& bin : body.bins.list())
+        const Points<2>& q = body.points;
+        for (const Bin<2>& bin : body.bins.list())
         {
             std::array<std::uint32_t, n> node;
             for (int k = 0; k < S * S; ++k)
-                node[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(lattice.node(bin.i + k % S, bin.j + k / S));
+                node[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(lattice.node(bin.at + block_index<S, 2>(k)));
             system.add_element(node);
             const typename Strain::template InBin<Shape> strain(lattice, q, bin);
             for_each_point<Shape>(lattice, q, bin,

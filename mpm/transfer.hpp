@@ -5,6 +5,7 @@
 #include "core/bodies/bin_sums.hpp"
 #include "core/bodies/support.hpp"
 #include "core/lattice/gather.hpp"
+#include "core/lattice/nodes.hpp"
 #include "core/lattice/kinematics.hpp"
 
 namespace testbed
@@ -19,39 +20,54 @@ concept NodalShape = requires
     Shape::weights(0.5, 1.0).size() + Shape::slopes(0.5, 1.0).size();
 };
 
-/// Values and gradients of the S x S shape functions at a pack of points; gradients in 1/m.
-template <NodalShape Shape>
+/// Values and gradients of the S^dim shape functions at a pack of points; gradients in 1/m.
+template <NodalShape Shape, int dim = Body::dim>
 struct ShapeAt
 {
     static constexpr int S = Shape::S;
-    std::array<Pack, S> wx, wy, gx, gy;
+    std::array<std::array<Pack, S>, dim> weights, slopes;
 
-    TESTBED_INLINE ShapeAt(const Corner& c, double scale)
+    TESTBED_INLINE ShapeAt(const Corner<dim>& c, double scale)
     {
         if constexpr (Shape::has_box)
         {
             const auto inverse = inverse_widths(c);
-            wx = Shape::weights_by(c.ax, c.wx, inverse[0]);
-            wy = Shape::weights_by(c.ay, c.wy, inverse[1]);
-            gx = Shape::slopes_by(c.ax, c.wx, inverse[0]);
-            gy = Shape::slopes_by(c.ay, c.wy, inverse[1]);
+            unrolled<dim>(
+                [&](auto d) TESTBED_INLINE
+                {
+                    weights[d] = Shape::weights_by(c.a[d], c.width[d], inverse[d]);
+                    slopes[d] = Shape::slopes_by(c.a[d], c.width[d], inverse[d]);
+                });
         }
         else
-        {
-            wx = Shape::weights(c.ax, c.wx);
-            wy = Shape::weights(c.ay, c.wy);
-            gx = Shape::slopes(c.ax, c.wx);
-            gy = Shape::slopes(c.ay, c.wy);
-        }
-        for (int k = 0; k < S; ++k)
-        {
-            gx[k] *= Pack(scale);
-            gy[k] *= Pack(scale);
-        }
+            unrolled<dim>(
+                [&](auto d) TESTBED_INLINE
+                {
+                    weights[d] = Shape::weights(c.a[d], c.width[d]);
+                    slopes[d] = Shape::slopes(c.a[d], c.width[d]);
+                });
+        unrolled<dim>([&](auto d) TESTBED_INLINE { unrolled<S>([&](auto k) TESTBED_INLINE { slopes[d][k] *= Pack(scale); }); });
     }
-    Pack value(int i, int j) const { return wx[i] * wy[j]; }
-    Pack slope_x(int i, int j) const { return gx[i] * wy[j]; }
-    Pack slope_y(int i, int j) const { return wx[i] * gy[j]; }
+    /// Of node k of the bin's S^dim.
+    template <std::size_t k>
+    TESTBED_INLINE Pack value() const
+    {
+        return block_product<S, k>(weights);
+    }
+    template <std::size_t k>
+    TESTBED_INLINE Vec<dim, Pack> gradient() const
+    {
+        constexpr auto at = block_index<S, dim>(k);
+        Vec<dim, Pack> g;
+        unrolled<dim>(
+            [&](auto d) TESTBED_INLINE
+            {
+                const auto factor = [&](auto e) TESTBED_INLINE { return e == d ? slopes[e][at[e]] : weights[e][at[e]]; };
+                g[d] = factor(std::integral_constant<std::size_t, 0>{});
+                unrolled<dim - 1>([&](auto e) TESTBED_INLINE { g[d] *= factor(std::integral_constant<std::size_t, e + 1>{}); });
+            });
+        return g;
+    }
 };
 
 /// Strain at each point ("four-point").
@@ -61,7 +77,7 @@ struct PointStrain
     template <class Shape>
     struct InBin
     {
-        InBin(const Lattice&, const Points&, const Bin&) {}
+        InBin(const Lattice<Body::dim>&, const Points<Body::dim>&, const Bin<Body::dim>&) {}
     };
 };
 
@@ -70,37 +86,39 @@ struct NoSum
 };
 
 /// The centroid of a cell's points by volume.
+template <int dim = Body::dim>
 class Centroid
 {
 public:
-    struct Slopes
-    {
-        std::array<double, 4> x, y;  ///< 1/m
-    };
-    TESTBED_INLINE void add(Pack v, Pack ax, Pack ay)
+    static constexpr std::size_t nodes = 1 << dim;
+
+    TESTBED_INLINE Centroid() { set_zero(moment_); }
+    TESTBED_INLINE void add(Pack v, const Vec<dim, Pack>& a)
     {
         volume_ += v;
-        ax_ += v * ax;
-        ay_ += v * ay;
+        unrolled<dim>([&](auto d) TESTBED_INLINE { moment_[d] += v * a[d]; });
     }
-    /// Slopes of the bilinear shape functions there.
+    /// Gradients of the linear shape functions there [1/m].
     template <class Shape>
-    Slopes slopes(double scale) const
+    std::array<Vec<dim>, nodes> gradients(double scale) const
     {
         static_assert(Shape::S == 2 && !Shape::is_smooth);
         const double all = sum(volume_);
-        const ShapeAt<Shape> at({Pack(sum(ax_) / all), Pack(sum(ay_) / all), Pack(0.0), Pack(0.0)}, scale);
-        Slopes s;
-        for (int k = 0; k < 4; ++k)
+        Corner<dim> c;
+        for (std::size_t d = 0; d < dim; ++d)
         {
-            s.x[static_cast<std::size_t>(k)] = at.slope_x(k % 2, k / 2)[0];
-            s.y[static_cast<std::size_t>(k)] = at.slope_y(k % 2, k / 2)[0];
+            c.a[d] = Pack(sum(moment_[d]) / all);
+            c.width[d] = Pack(0.0);
         }
-        return s;
+        const ShapeAt<Shape, dim> at(c, scale);
+        std::array<Vec<dim>, nodes> g;
+        unrolled<nodes>([&](auto k) { unrolled<dim>([&](auto d) { g[k][d] = at.template gradient<k>()[d][0]; }); });
+        return g;
     }
 
 private:
-    Pack volume_{0.0}, ax_{0.0}, ay_{0.0};
+    Pack volume_{0.0};
+    Vec<dim, Pack> moment_;
 };
 
 /// Volumetric strain averaged over the cell (B-bar): the slopes that make the in-plane dilatation are those at the centroid of
@@ -111,24 +129,25 @@ struct BBarStrain
     template <class Shape>
     struct InBin
     {
-        std::array<Pack, 4> mean_x, mean_y;
+        static constexpr int dim = Body::dim;
+        std::array<Vec<dim, Pack>, Centroid<dim>::nodes> mean;
 
-        InBin(const Lattice& lattice, const Points& q, const Bin& bin)
+        InBin(const Lattice<dim>& lattice, const Points<dim>& q, const Bin<dim>& bin)
         {
-            const BinFrame frame(lattice, bin);
-            Centroid centroid;
+            const BinFrame<dim> frame(lattice, bin);
+            Centroid<dim> centroid;
             for_each_pack(bin.begin, bin.end,
                           [&](std::size_t p, const auto& lanes)
                           {
-                              const Corner c = frame.corner<Shape>(q, p, lanes);
-                              centroid.add(lanes.keep(volume<Shape>(q, p, lanes)), lanes.keep(c.ax), lanes.keep(c.ay));
+                              Corner<dim> c = frame.template corner<Shape>(q, p, lanes);
+                              for (Pack& a : c.a)
+                                  a = lanes.keep(a);
+                              centroid.add(lanes.keep(volume<Shape>(q, p, lanes)), c.a);
                           });
-            const auto slopes = centroid.slopes<Shape>(frame.scale);
-            for (std::size_t k = 0; k < 4; ++k)
-            {
-                mean_x[k] = Pack(slopes.x[k]);
-                mean_y[k] = Pack(slopes.y[k]);
-            }
+            const auto gradients = centroid.template gradients<Shape>(frame.scale);
+            for (std::size_t k = 0; k < mean.size(); ++k)
+                for (std::size_t d = 0; d < dim; ++d)
+                    mean[k][d] = Pack(gradients[k][d]);
         }
     };
 };
@@ -141,81 +160,76 @@ enum class Scatter
     momentum_and_force  ///< both
 };
 template <Scatter what>
-inline constexpr std::size_t sums_of = what == Scatter::momentum_and_force ? 5
-                                       : what == Scatter::momentum         ? 3
-                                                                           : 2;
+inline constexpr std::size_t sums_of = (what == Scatter::force ? 0 : 1 + Body::dim) + (what == Scatter::momentum ? 0 : Body::dim);
 
-/// What the points of one bin give to its S x S nodes: m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V (sigma + p I) . grad N_i
+/// What the points of one bin give to its S^dim nodes: m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V (sigma + p I) . grad N_i
 /// with the confining pressure p. With B-bar the mean in-plane stress works on the cell's dilatation: dual to NodalVelocity::gradient().
 template <class Shape, class Strain, Scatter what>
 class NodeSums
 {
 public:
-    static constexpr int S = Shape::S;
-    static constexpr std::size_t Q = sums_of<what>, numbers = static_cast<std::size_t>(S * S) * Q;
+    static constexpr int S = Shape::S, dim = Body::dim;
+    static constexpr std::size_t blocks = block_size<S, dim>, Q = sums_of<what>, numbers = blocks * Q;
 
-    TESTBED_INLINE NodeSums(const Lattice& lattice, const Bin&) : scale_(lattice.cells_per_length) { set_zero(total_); }
+    TESTBED_INLINE NodeSums(const Lattice<dim>& lattice, const Bin<dim>&) : scale_(lattice.cells_per_length) { set_zero(total_); }
 
     /// Points [p, p + lanes) of the body, with their support at c.
     template <class Lanes>
-    TESTBED_INLINE void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner& c)
+    TESTBED_INLINE void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner<dim>& c)
     {
-        const ShapeAt<Shape> at(c, scale_);
-        const Points& q = body.points;
-        [[maybe_unused]] Pack m, px, py, txx, tyy, txy;
+        const ShapeAt<Shape, dim> at(c, scale_);
+        const Points<dim>& q = body.points;
+        [[maybe_unused]] Pack mass;
+        [[maybe_unused]] Vec<dim, Pack> momentum;
+        [[maybe_unused]] SymTensor<dim, Pack> t;
         if constexpr (what != Scatter::force)
         {
-            m = lanes.keep(Pack(q.mass));
-            px = m * lanes.load(&q.vx[p]);
-            py = m * lanes.load(&q.vy[p]);
+            mass = lanes.keep(Pack(q.mass));
+            unrolled<dim>([&](auto d) TESTBED_INLINE { momentum[d] = mass * lanes.load(&q.v[d][p]); });
         }
         if constexpr (what != Scatter::momentum)
         {
             const Pack v = lanes.keep(volume<Shape>(q, p, lanes));
-            const SymTensor<Pack> s = total_stress(body, p, lanes);
-            txx = v * s.xx;
-            tyy = v * s.yy;
-            txy = v * s.xy;
+            const SymTensor<dim, Pack> s = total_stress(body, p, lanes);
+            unrolled<symmetric_components<dim>>([&](auto k) TESTBED_INLINE { component<k>(t) = v * component<k>(s); });
             if constexpr (Strain::averaged)
             {
-                const Pack mean = Pack(0.5) * (txx + tyy);
-                txx -= mean;
-                tyy -= mean;
+                const Pack mean = Pack(1.0 / dim) * total<dim>([&](auto d) TESTBED_INLINE { return component<d, d>(t); });
+                unrolled<dim>([&](auto d) TESTBED_INLINE { component<d, d>(t) -= mean; });
                 mean_ += mean;
-                strain_.add(v, lanes.keep(c.ax), lanes.keep(c.ay));
+                Vec<dim, Pack> place;
+                unrolled<dim>([&](auto d) TESTBED_INLINE { place[d] = lanes.keep(c.a[d]); });
+                strain_.add(v, place);
             }
         }
-        for (int j = 0; j < S; ++j)
-            for (int i = 0; i < S; ++i)
+        unrolled<blocks>(
+            [&](auto k) TESTBED_INLINE
             {
-                Pack* to = &total_[static_cast<std::size_t>(j * S + i) * Q];
+                Pack* to = &total_[k * Q];
                 if constexpr (what != Scatter::force)
                 {
-                    const Pack N = at.value(i, j);
-                    to[0] += m * N;
-                    to[1] += px * N;
-                    to[2] += py * N;
+                    const Pack N = at.template value<k>();
+                    to[0] += mass * N;
+                    unrolled<dim>([&](auto d) TESTBED_INLINE { to[1 + d] += momentum[d] * N; });
                 }
                 if constexpr (what != Scatter::momentum)
                 {
-                    const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
-                    to[Q - 2] -= txx * nx + txy * ny;
-                    to[Q - 1] -= txy * nx + tyy * ny;
+                    const Vec<dim, Pack> g = at.template gradient<k>();
+                    unrolled<dim>([&](auto i) TESTBED_INLINE
+                                  { to[Q - dim + i] -= total<dim>([&](auto j) TESTBED_INLINE { return component<i, j>(t) * g[j]; }); });
                 }
-            }
+            });
     }
-    TESTBED_INLINE void write(const Body&, const Bin&, double* to) const
+    TESTBED_INLINE void write(const Body&, const Bin<dim>&, double* to) const
     {
         sum(total_, to);
         if constexpr (Strain::averaged && what != Scatter::momentum)
         {
-            const auto slopes = strain_.template slopes<Shape>(scale_);
+            const auto gradients = strain_.template gradients<Shape>(scale_);
             const double mean = sum(mean_);
-            for (std::size_t k = 0; k < static_cast<std::size_t>(S * S); ++k)
-            {
-                to[k * Q + Q - 2] -= mean * slopes.x[k];
-                to[k * Q + Q - 1] -= mean * slopes.y[k];
-            }
+            for (std::size_t k = 0; k < blocks; ++k)
+                for (std::size_t d = 0; d < dim; ++d)
+                    to[k * Q + Q - dim + d] -= mean * gradients[k][d];
         }
     }
 
@@ -223,12 +237,12 @@ private:
     double scale_;
     std::array<Pack, numbers> total_;
     [[no_unique_address]] std::conditional_t<Strain::averaged, Pack, NoSum> mean_{};
-    [[no_unique_address]] std::conditional_t<Strain::averaged, Centroid, NoSum> strain_{};
+    [[no_unique_address]] std::conditional_t<Strain::averaged, Centroid<dim>, NoSum> strain_{};
 };
 
 /// The sums of all bins of a body, anew.
 template <class Shape, class Strain, Scatter what>
-void scatter(const Lattice& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial)
+void scatter(const Lattice<Body::dim>& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial)
 {
     using Sums = NodeSums<Shape, Strain, what>;
     const auto& bins = body.bins.list();
@@ -237,59 +251,55 @@ void scatter(const Lattice& lattice, const Body& body, std::size_t first_bin, st
 }
 
 /// Nodal values of one bin.
-template <int S>
+template <int S, int dim = Body::dim>
 struct NodalVelocity
 {
-    std::array<double, static_cast<std::size_t>(S*S)> x, y;
+    static constexpr std::size_t blocks = block_size<S, dim>;
+    std::array<std::array<double, blocks>, dim> v;
 
-    TESTBED_INLINE NodalVelocity(const Lattice& lattice, const Bin& bin, const std::vector<double>& vx, const std::vector<double>& vy)
+    TESTBED_INLINE NodalVelocity(const Lattice<dim>& lattice, const Bin<dim>& bin, const VectorField<dim>& nodal)
     {
-        for (int j = 0; j < S; ++j)
-            for (int i = 0; i < S; ++i)
-            {
-                const std::size_t n = lattice.node(bin.i + i, bin.j + j);
-                x[j * S + i] = vx[n];
-                y[j * S + i] = vy[n];
-            }
+        for (std::size_t k = 0; k < blocks; ++k)
+        {
+            const std::size_t n = lattice.node(bin.at + block_index<S, dim>(static_cast<int>(k)));
+            for (std::size_t d = 0; d < dim; ++d)
+                v[d][k] = nodal[d][n];
+        }
     }
     template <class At>
-    TESTBED_INLINE std::array<Pack, 2> at(const At& at) const
+    TESTBED_INLINE Vec<dim, Pack> at(const At& at) const
     {
-        Pack vx(0.0), vy(0.0);
-        for (int j = 0; j < S; ++j)
-            for (int i = 0; i < S; ++i)
+        Vec<dim, Pack> u;
+        set_zero(u);
+        unrolled<blocks>(
+            [&](auto k) TESTBED_INLINE
             {
-                const Pack N = at.value(i, j);
-                vx += N * Pack(x[j * S + i]);
-                vy += N * Pack(y[j * S + i]);
-            }
-        return {vx, vy};
+                const Pack N = at.template value<k>();
+                unrolled<dim>([&](auto d) TESTBED_INLINE { u[d] += N * Pack(v[d][k]); });
+            });
+        return u;
     }
     /// Gradient of the increment over dt, with the dilatation that `strain` prescribes.
     template <class Strain, class At, class InBin>
-    TESTBED_INLINE Gradient<Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
+    TESTBED_INLINE Gradient<dim, Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
     {
-        Gradient<Pack> d{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
+        Gradient<dim, Pack> g = zero_gradient<dim>();
         [[maybe_unused]] Pack dilatation(0.0);
-        for (int j = 0; j < S; ++j)
-            for (int i = 0; i < S; ++i)
+        unrolled<blocks>(
+            [&](auto k) TESTBED_INLINE
             {
-                const Pack nx = at.slope_x(i, j), ny = at.slope_y(i, j);
-                const Pack vx(x[j * S + i]), vy(y[j * S + i]);
-                d.xx += nx * vx;
-                d.yy += ny * vy;
-                d.xy += ny * vx;
-                d.yx += nx * vy;
+                const Vec<dim, Pack> slope = at.template gradient<k>();
+                unrolled<dim>([&](auto i) TESTBED_INLINE
+                              { unrolled<dim>([&](auto j) TESTBED_INLINE { component<i, j>(g) += slope[j] * Pack(v[i][k]); }); });
                 if constexpr (Strain::averaged)
-                    dilatation += strain.mean_x[j * S + i] * vx + strain.mean_y[j * S + i] * vy;
-            }
+                    dilatation += total<dim>([&](auto d) TESTBED_INLINE { return strain.mean[k][d] * Pack(v[d][k]); });
+            });
         if constexpr (Strain::averaged)
         {
-            const Pack correction = Pack(0.5) * (dilatation - d.trace());
-            d.xx += correction;
-            d.yy += correction;
+            const Pack correction = Pack(1.0 / dim) * (dilatation - g.trace());
+            unrolled<dim>([&](auto d) TESTBED_INLINE { component<d, d>(g) += correction; });
         }
-        return Pack(dt) * d;
+        return Pack(dt) * g;
     }
 };
 }  // namespace testbed

@@ -15,17 +15,17 @@ struct FlipUpdate
         NodalVelocity<S> increment;
 
         template <class At, class Lanes>
-        TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const At& at) const
+        TESTBED_INLINE void update(Points<Body::dim>& q, std::size_t p, const Lanes& lanes, const At& at) const
         {
             const auto dv = increment.at(at);
-            lanes.store(&q.vx[p], lanes.load(&q.vx[p]) + dv[0]);
-            lanes.store(&q.vy[p], lanes.load(&q.vy[p]) + dv[1]);
+            unrolled<Body::dim>([&](auto d) TESTBED_INLINE { lanes.store(&q.v[d][p], lanes.load(&q.v[d][p]) + dv[d]); });
         }
     };
     template <int S>
-    TESTBED_INLINE InBin<S> in_bin(const Lattice& lattice, const Nodes& nodes, const Body&, const Bin& bin) const
+    TESTBED_INLINE InBin<S> in_bin(const Lattice<Body::dim>& lattice, const Nodes<Body::dim>& nodes, const Body&,
+                                   const Bin<Body::dim>& bin) const
     {
-        return {NodalVelocity<S>(lattice, bin, nodes.fx, nodes.fy)};
+        return {NodalVelocity<S>(lattice, bin, nodes.f)};
     }
 };
 
@@ -41,18 +41,18 @@ struct BlendUpdate
         Pack flip, pic;
 
         template <class At, class Lanes>
-        TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const At& at) const
+        TESTBED_INLINE void update(Points<Body::dim>& q, std::size_t p, const Lanes& lanes, const At& at) const
         {
             const auto dv = increment.at(at), v = total.at(at);
-            lanes.store(&q.vx[p], flip * (lanes.load(&q.vx[p]) + dv[0]) + pic * v[0]);
-            lanes.store(&q.vy[p], flip * (lanes.load(&q.vy[p]) + dv[1]) + pic * v[1]);
+            unrolled<Body::dim>([&](auto d) TESTBED_INLINE
+                                { lanes.store(&q.v[d][p], flip * (lanes.load(&q.v[d][p]) + dv[d]) + pic * v[d]); });
         }
     };
     template <int S>
-    TESTBED_INLINE InBin<S> in_bin(const Lattice& lattice, const Nodes& nodes, const Body&, const Bin& bin) const
+    TESTBED_INLINE InBin<S> in_bin(const Lattice<Body::dim>& lattice, const Nodes<Body::dim>& nodes, const Body&,
+                                   const Bin<Body::dim>& bin) const
     {
-        return {NodalVelocity<S>(lattice, bin, nodes.fx, nodes.fy), NodalVelocity<S>(lattice, bin, nodes.vx, nodes.vy), Pack(flip),
-                Pack(1 - flip)};
+        return {NodalVelocity<S>(lattice, bin, nodes.f), NodalVelocity<S>(lattice, bin, nodes.v), Pack(flip), Pack(1 - flip)};
     }
 };
 }  // namespace testbed

@@ -16,84 +16,86 @@ template <class Shape>
 class SmoothedSums
 {
 public:
-    static constexpr int S = Shape::S;
-    static constexpr std::size_t Q = 2, numbers = static_cast<std::size_t>(S * S) * Q;
+    static constexpr int S = Shape::S, dim = Body::dim;
+    static constexpr std::size_t blocks = block_size<S, dim>, Q = dim, numbers = blocks * Q;
 
-    TESTBED_INLINE SmoothedSums(const Lattice& lattice, const Bin& bin, const std::vector<double>& x, const std::vector<double>& y)
+    TESTBED_INLINE SmoothedSums(const Lattice<dim>& lattice, const Bin<dim>& bin, const VectorField<dim>& field)
         : scale_(lattice.cells_per_length),
-          field_(lattice, bin, x, y)
+          field_(lattice, bin, field)
     {
         set_zero(total_);
     }
     template <class Lanes>
-    TESTBED_INLINE void add(const Points& q, const Lanes& lanes, const Corner& c)
+    TESTBED_INLINE void add(const Points<dim>& q, const Lanes& lanes, const Corner<dim>& c)
     {
-        const ShapeAt<Shape> at(c, scale_);
-        const auto v = field_.at(at);
-        const Pack px = lanes.keep(Pack(q.mass) * v[0]), py = lanes.keep(Pack(q.mass) * v[1]);
-        for (int j = 0; j < S; ++j)
-            for (int i = 0; i < S; ++i)
+        const ShapeAt<Shape, dim> at(c, scale_);
+        Vec<dim, Pack> momentum = field_.at(at);
+        for (Pack& component : momentum)
+            component = lanes.keep(Pack(q.mass) * component);
+        unrolled<blocks>(
+            [&](auto k) TESTBED_INLINE
             {
-                const Pack N = at.value(i, j);
-                total_[static_cast<std::size_t>(j * S + i) * Q] += px * N;
-                total_[static_cast<std::size_t>(j * S + i) * Q + 1] += py * N;
-            }
+                const Pack N = at.template value<k>();
+                unrolled<dim>([&](auto d) TESTBED_INLINE { total_[k * Q + d] += momentum[d] * N; });
+            });
     }
     TESTBED_INLINE void write(double* to) const { sum(total_, to); }
 
 private:
     double scale_;
-    NodalVelocity<S> field_;
+    NodalVelocity<S, dim> field_;
     std::array<Pack, numbers> total_;
 };
 
 class Xpic
 {
 public:
+    static constexpr int dim = Body::dim;
+
     explicit Xpic(int order) : order_(order) {}
 
     /// w from the nodal velocity, before supports and walls.
-    /// @param smooth (x, y): nodal field -> S+ S of it
+    /// @param smooth nodal field -> S+ S of it, in place
     template <class Smooth>
-    void filter(const Nodes& nodes, const std::vector<double>& vx, const std::vector<double>& vy, Smooth&& smooth)
+    void filter(const Nodes<dim>& nodes, const VectorField<dim>& v, Smooth&& smooth)
     {
-        for (auto* field : {&term_x_, &term_y_, &w_x_, &w_y_})
-            field->resize(vx.size());
+        for (auto* field : {&term_, &w_})
+            for (auto& component : *field)
+                component.resize(v[0].size());
         const double m = order_;
-        set_term(nodes, vx, vy);
         nodes.for_each(
             [&](std::size_t i, const auto& lanes)
             {
-                lanes.store(&w_x_[i], Pack(m) * lanes.load(&term_x_[i]));
-                lanes.store(&w_y_[i], Pack(m) * lanes.load(&term_y_[i]));
+                const Vec<dim, Pack> first = load(v, i, lanes);
+                store(term_, i, lanes, first);
+                unrolled<dim>([&](auto d) { lanes.store(&w_[d][i], Pack(m) * first[d]); });
             });
         for (int r = 2; r <= order_; ++r)
         {
-            smooth(term_x_, term_y_);
+            smooth(term_);
             const Pack scale((m - r + 1) / r), sign(r % 2 ? m : -m);
             nodes.for_each(
                 [&](std::size_t i, const auto& lanes)
                 {
-                    const Pack x = scale * lanes.load(&term_x_[i]), y = scale * lanes.load(&term_y_[i]);
-                    lanes.store(&term_x_[i], x);
-                    lanes.store(&term_y_[i], y);
-                    lanes.store(&w_x_[i], lanes.load(&w_x_[i]) + sign * x);
-                    lanes.store(&w_y_[i], lanes.load(&w_y_[i]) + sign * y);
+                    unrolled<dim>(
+                        [&](auto d)
+                        {
+                            const Pack term = scale * lanes.load(&term_[d][i]);
+                            lanes.store(&term_[d][i], term);
+                            lanes.store(&w_[d][i], lanes.load(&w_[d][i]) + sign * term);
+                        });
                 });
         }
     }
-    std::vector<double>& kept_x() { return w_x_; }  ///< w, what the filter keeps [m/s]
-    std::vector<double>& kept_y() { return w_y_; }
+    VectorField<dim>& kept() { return w_; }  ///< w, what the filter keeps [m/s]
 
     /// Room for what the filter takes from the points, in their present order.
     void begin_update(const std::vector<Body>& bodies)
     {
         taken_.resize(bodies.size());
         for (std::size_t b = 0; b < bodies.size(); ++b)
-        {
-            make_room(taken_[b].x, bodies[b].points.count);
-            make_room(taken_[b].y, bodies[b].points.count);
-        }
+            for (auto& component : taken_[b])
+                make_room(component, bodies[b].points.count);
         first_ = bodies.data();
     }
 
@@ -102,65 +104,52 @@ public:
     struct InBin
     {
         NodalVelocity<S> w, increment;
-        double *taken_x, *taken_y;  ///< by point
+        Vec<dim, double*> taken;  ///< by point
 
         template <class At, class Lanes>
-        TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const At& at) const
+        TESTBED_INLINE void update(Points<dim>& q, std::size_t p, const Lanes& lanes, const At& at) const
         {
             const auto kept = w.at(at), dv = increment.at(at);
-            lanes.store(taken_x + p, lanes.load(&q.vx[p]) - kept[0]);
-            lanes.store(taken_y + p, lanes.load(&q.vy[p]) - kept[1]);
-            lanes.store(&q.vx[p], kept[0] + dv[0]);
-            lanes.store(&q.vy[p], kept[1] + dv[1]);
+            unrolled<dim>(
+                [&](auto d) TESTBED_INLINE
+                {
+                    lanes.store(taken[d] + p, lanes.load(&q.v[d][p]) - kept[d]);
+                    lanes.store(&q.v[d][p], kept[d] + dv[d]);
+                });
         }
     };
     template <int S>
-    TESTBED_INLINE InBin<S> in_bin(const Lattice& lattice, const Nodes& nodes, const Body& body, const Bin& bin)
+    TESTBED_INLINE InBin<S> in_bin(const Lattice<dim>& lattice, const Nodes<dim>& nodes, const Body& body, const Bin<dim>& bin)
     {
-        Taken& taken = taken_[static_cast<std::size_t>(&body - first_)];
-        return {NodalVelocity<S>(lattice, bin, w_x_, w_y_), NodalVelocity<S>(lattice, bin, nodes.fx, nodes.fy), taken.x.data(),
-                taken.y.data()};
+        Vec<dim, double*> taken;
+        for (std::size_t d = 0; d < dim; ++d)
+            taken[d] = taken_[static_cast<std::size_t>(&body - first_)][d].data();
+        return {NodalVelocity<S>(lattice, bin, w_), NodalVelocity<S>(lattice, bin, nodes.f), taken};
     }
 
     /// x_p -= dt/2 (v_p - S w), for the points of a bin, after the nodes have moved them.
-    void move(Body& body, const Bin& bin, double dt) const
+    void move(Body& body, const Bin<dim>& bin, double dt) const
     {
-        const Taken& taken = taken_[static_cast<std::size_t>(&body - first_)];
-        Points& q = body.points;
+        const VectorField<dim>& taken = taken_[static_cast<std::size_t>(&body - first_)];
+        Points<dim>& q = body.points;
         const Pack half(0.5 * dt);
         for_each_pack(bin.begin, bin.end,
-                      [&](std::size_t p, const auto& lanes)
-                      {
-                          lanes.store(&q.x[p], lanes.load(&q.x[p]) - half * lanes.load(&taken.x[p]));
-                          lanes.store(&q.y[p], lanes.load(&q.y[p]) - half * lanes.load(&taken.y[p]));
+                      [&](std::size_t p, const auto& lanes) {
+                          unrolled<dim>([&](auto d) { lanes.store(&q.x[d][p], lanes.load(&q.x[d][p]) - half * lanes.load(&taken[d][p])); });
                       });
     }
     std::size_t bytes() const
     {
-        std::size_t n = term_x_.capacity() + term_y_.capacity() + w_x_.capacity() + w_y_.capacity();
-        for (const Taken& t : taken_)
-            n += t.x.capacity() + t.y.capacity();
+        std::size_t n = dim * (term_[0].capacity() + w_[0].capacity());
+        for (const auto& taken : taken_)
+            n += dim * taken[0].capacity();
         return n * sizeof(double);
     }
 
 private:
-    struct Taken
-    {
-        std::vector<double> x, y;  ///< m/s
-    };
-    void set_term(const Nodes& nodes, const std::vector<double>& vx, const std::vector<double>& vy)
-    {
-        nodes.for_each(
-            [&](std::size_t i, const auto& lanes)
-            {
-                lanes.store(&term_x_[i], lanes.load(&vx[i]));
-                lanes.store(&term_y_[i], lanes.load(&vy[i]));
-            });
-    }
-
     int order_;
-    std::vector<double> term_x_, term_y_, w_x_, w_y_;
-    std::vector<Taken> taken_;
+    VectorField<dim> term_, w_;
+    std::vector<VectorField<dim>> taken_;  ///< of the points, body by body [m/s]
     const Body* first_ = nullptr;
 };
 }  // namespace testbed

@@ -12,8 +12,8 @@ TEST(Fill, BoxStartsAtItsOwnCorner)
     BodySpec box;
     box.shape = BodySpec::Shape::box;
     box.points_per_cell = 2;
-    box.min = Vec2{0.3, 0.1};
-    box.max = Vec2{1.3, 0.6};
+    box.min = Vec<2>{0.3, 0.1};
+    box.max = Vec<2>{1.3, 0.6};
     Scene scene;
     scene.grid = {{0, 0}, {2, 2}, 0.5};
     const auto points = fill(scene, box);
@@ -29,7 +29,7 @@ TEST(Fill, DiskAndPolygonAreas)
     scene.grid = {{-2, -2}, {4, 4}, 0.1};
     BodySpec disk;
     disk.shape = BodySpec::Shape::disk;
-    disk.center = Vec2{0.2, -0.1};
+    disk.center = Vec<2>{0.2, -0.1};
     disk.radius = 1.3;
     const double share = 0.025 * 0.025;
     EXPECT_NEAR(static_cast<double>(fill(scene, disk).size()) * share, 3.14159 * 1.69, 0.01);
@@ -43,11 +43,11 @@ TEST(Bodies, CarryOnlyTheFieldsThatAreNeeded)
 {
     const Scene scene = test::load(test::two_bodies());
     const auto bodies = make_bodies(scene, make_lattice(scene.grid), {.initial_position = false});
-    EXPECT_FALSE(bodies[0].points.X.active() || bodies[0].points.half_x.active() || bodies[0].points.vx.active() ||
+    EXPECT_FALSE(bodies[0].points.X[0].active() || bodies[0].points.half_width[0].active() || bodies[0].points.v[0].active() ||
                  bodies[0].points.stiffness.active());
     EXPECT_TRUE(bodies[1].points.stiffness.active());  // its modulus is an expression
     const auto more = make_bodies(scene, make_lattice(scene.grid), {.box = true, .velocity = true});
-    EXPECT_TRUE(more[0].points.X.active() && more[0].points.half_x.active() && more[0].points.vx.active());
+    EXPECT_TRUE(more[0].points.X[0].active() && more[0].points.half_width[0].active() && more[0].points.v[0].active());
     EXPECT_FALSE(more[0].points.volume.active());  // follows from the box
     EXPECT_DOUBLE_EQ(more[0].points.current_volume(0), more[0].points.initial_volume);
 }
@@ -56,13 +56,13 @@ TEST(Bodies, ValuesAtPoints)
 {
     const Scene scene = test::load(test::two_bodies());
     const auto bodies = make_bodies(scene, make_lattice(scene.grid), {.velocity = true});
-    const Points& q = bodies[1].points;
+    const Points<2>& q = bodies[1].points;
     const double largest = moduli(bodies[1].material).youngs_modulus();
     for (std::size_t p = 0; p < q.count; ++p)
     {
-        EXPECT_NEAR(largest * q.stiffness[p], 3e4 * (1 + q.X[p] * q.X[p]), 1e-6);
-        EXPECT_DOUBLE_EQ(q.vx[p], -0.3 * q.Y[p]);
-        EXPECT_DOUBLE_EQ(q.vy[p], 0.4 * q.X[p]);
+        EXPECT_NEAR(largest * q.stiffness[p], 3e4 * (1 + q.X[0][p] * q.X[0][p]), 1e-6);
+        EXPECT_DOUBLE_EQ(q.v[0][p], -0.3 * q.X[1][p]);
+        EXPECT_DOUBLE_EQ(q.v[1][p], 0.4 * q.X[0][p]);
         EXPECT_EQ(q.id[p], bodies[0].points.count + p);
     }
     EXPECT_DOUBLE_EQ(q.mass, 1500 * 0.25 / 9);

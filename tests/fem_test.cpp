@@ -90,23 +90,23 @@ std::unique_ptr<FemSolver> solved(const Scene& scene)
 
 struct Exact
 {
-    Vec2 displacement;
-    SymTensor<> stress;
+    Vec<2> displacement;
+    SymTensor<2> stress;
 };
 /// Relative L2 errors of displacement and stress over all points.
 template <class F>
-Vec2 errors(const FemSolver& solver, F&& exact)
+Vec<2> errors(const FemSolver& solver, F&& exact)
 {
     double du = 0, u = 0, ds = 0, s = 0;
     for (const Body& body : solver.bodies())
         for (std::size_t p = 0; p < body.points.count; ++p)
         {
-            const Points& q = body.points;
-            const Exact e = exact(q.X[p], q.Y[p]);
-            const double dx = q.x[p] - q.X[p] - e.displacement[0], dy = q.y[p] - q.Y[p] - e.displacement[1];
+            const Points<2>& q = body.points;
+            const Exact e = exact(q.X[0][p], q.X[1][p]);
+            const double dx = q.x[0][p] - q.X[0][p] - e.displacement[0], dy = q.x[1][p] - q.X[1][p] - e.displacement[1];
             du += dx * dx + dy * dy;
             u += e.displacement[0] * e.displacement[0] + e.displacement[1] * e.displacement[1];
-            const double xx = q.sxx[p] - e.stress.xx, yy = q.syy[p] - e.stress.yy, xy = q.sxy[p] - e.stress.xy;
+            const double xx = q.stress[0][p] - e.stress.xx, yy = q.stress[1][p] - e.stress.yy, xy = q.stress[2][p] - e.stress.xy;
             ds += xx * xx + yy * yy + 2 * xy * xy;
             s += e.stress.xx * e.stress.xx + e.stress.yy * e.stress.yy + 2 * e.stress.xy * e.stress.xy;
         }
@@ -134,7 +134,8 @@ double largest_stress(const FemSolver& solver)
     double largest = 0;
     for (const Body& body : solver.bodies())
         for (std::size_t p = 0; p < body.points.count; ++p)
-            largest = std::max({largest, std::abs(body.points.sxx[p]), std::abs(body.points.syy[p]), std::abs(body.points.sxy[p])});
+            largest = std::max(
+                {largest, std::abs(body.points.stress[0][p]), std::abs(body.points.stress[1][p]), std::abs(body.points.stress[2][p])});
     return largest;
 }
 
@@ -143,7 +144,7 @@ TEST(FemStatic, Q2HoldsTheColumnExactlyAtAnyCellSize)
     for (const char* L : {"2.0", "1.0", "0.5"})
     {
         const Scene scene = column({fmt::format("grid.cell_size={}", L), "fem.analysis=static"});
-        const Vec2 e = errors(*solved(scene), exact_column);
+        const Vec<2> e = errors(*solved(scene), exact_column);
         EXPECT_LT(e[0], 1e-11) << L;
         EXPECT_LT(e[1], 1e-11) << L;
     }
@@ -156,7 +157,7 @@ TEST(FemStatic, Q1ConvergesWithOrderTwoInDisplacementAndOneInStress)
         const Scene scene = column({setting, "fem.analysis=static"}, "fem-q1");
         return errors(*solved(scene), exact_column);
     };
-    const Vec2 coarse = at("grid.cell_size=0.5"), fine = at("grid.cell_size=0.25");
+    const Vec<2> coarse = at("grid.cell_size=0.5"), fine = at("grid.cell_size=0.25");
     EXPECT_NEAR(std::log2(coarse[0] / fine[0]), 2, 0.02);
     EXPECT_NEAR(std::log2(coarse[1] / fine[1]), 1, 0.02);
 }
@@ -182,17 +183,17 @@ TEST(FemStatic, TwoBodiesInSeriesShareTheirStress)
                                  {"fem.analysis=static"});
     const auto solver = solved(scene);
     const double weight = 2500 * g * 2;  // of the upper body, on the interface
-    const Vec2 e = errors(*solver,
-                          [&](double, double Y)
-                          {
-                              const bool lower = Y < 2;
-                              const double syy = lower ? -weight - rho * g * (2 - Y) : -2500 * g * (4 - Y);
-                              const double interface = -(2 * weight + rho * g * 2) / M;
-                              const double h = Y - 2;
-                              const double uy = lower ? -(weight * Y + rho * g * (2 * Y - Y * Y / 2)) / M
-                                                      : interface - 2500 * g * (2 * h - h * h / 2) / M2;
-                              return Exact{{0, uy}, {nu / (1 - nu) * syy, syy, 0}};
-                          });
+    const Vec<2> e = errors(*solver,
+                            [&](double, double Y)
+                            {
+                                const bool lower = Y < 2;
+                                const double syy = lower ? -weight - rho * g * (2 - Y) : -2500 * g * (4 - Y);
+                                const double interface = -(2 * weight + rho * g * 2) / M;
+                                const double h = Y - 2;
+                                const double uy = lower ? -(weight * Y + rho * g * (2 * Y - Y * Y / 2)) / M
+                                                        : interface - 2500 * g * (2 * h - h * h / 2) / M2;
+                                return Exact{{0, uy}, {nu / (1 - nu) * syy, syy, 0}};
+                            });
     EXPECT_LT(e[0], 1e-11);
     EXPECT_LT(e[1], 1e-11);
 }
@@ -205,10 +206,10 @@ TEST(FemStatic, ModulusOfPositionAndBodyForceHoldAManufacturedSolution)
                                  "youngs_modulus = \"5e7*(1+Y/4)\"\npoissons_ratio = 0.0\n";
     const std::string force = "[body_force]\nacceleration = [\"0\", \"-2*5e7*1e-3*Y/(4*1700)\"]\n";
     const Scene scene = scene_of(material + box("column", 0, 0, 2, H) + force + supports, {"fem.analysis=static"});
-    const Vec2 e = errors(*solved(scene),
-                          [&](double, double Y) {
-                              return Exact{{0, a * (Y * Y / 2 - H * Y)}, {0, E * (1 + Y / H) * a * (Y - H), 0}};
-                          });
+    const Vec<2> e = errors(*solved(scene),
+                            [&](double, double Y) {
+                                return Exact{{0, a * (Y * Y / 2 - H * Y)}, {0, E * (1 + Y / H) * a * (Y - H), 0}};
+                            });
     EXPECT_LT(e[0], 1e-11);
     EXPECT_LT(e[1], 1e-11);
 }
@@ -222,13 +223,13 @@ TEST(FemStatic, ShearCarriesTheLoadAboveIt)
                                  {"fem.analysis=static"});
     const auto solver = solved(scene);
     // the free sides bend the shear across the layer, but its mean on a level is rho b (H - Y)
-    const Points& q = solver->bodies()[0].points;
+    const Points<2>& q = solver->bodies()[0].points;
     double sum = 0;
     int n = 0;
     for (std::size_t p = 0; p < q.count; ++p)
-        if (q.Y[p] < 1)
-            sum += q.sxy[p], ++n;
-    EXPECT_GT(q.x[q.count - 1] - q.X[q.count - 1], 0);
+        if (q.X[1][p] < 1)
+            sum += q.stress[2][p], ++n;
+    EXPECT_GT(q.x[0][q.count - 1] - q.X[0][q.count - 1], 0);
     EXPECT_NEAR(sum / n, rho * 2.0 * (H - 0.5), 0.05 * rho * 2.0 * H);
 }
 
@@ -241,21 +242,21 @@ std::string held(const std::string& name, const std::string& where, const std::s
 {
     return fmt::format("[[boundary]]\nname = \"{}\"\nwhere = \"{}\"\nfix = \"{}\"\n", name, where, fix);
 }
-void expect_uniform_stress(const FemSolver& solver, const SymTensor<>& s)
+void expect_uniform_stress(const FemSolver& solver, const SymTensor<2>& s)
 {
-    const Points& q = solver.bodies()[0].points;
+    const Points<2>& q = solver.bodies()[0].points;
     for (std::size_t p = 0; p < q.count; ++p)
     {
-        EXPECT_NEAR(q.sxx[p], s.xx, 1e-6);
-        EXPECT_NEAR(q.syy[p], s.yy, 1e-6);
-        EXPECT_NEAR(q.sxy[p], s.xy, 1e-6);
+        EXPECT_NEAR(q.stress[0][p], s.xx, 1e-6);
+        EXPECT_NEAR(q.stress[1][p], s.yy, 1e-6);
+        EXPECT_NEAR(q.stress[2][p], s.xy, 1e-6);
     }
 }
 
 /// A uniform stress follows from its tractions, on each pair of faces; the other two are supported.
 TEST(FemStatic, TractionsOnEachFace)
 {
-    const SymTensor<> s{3e3, -5e3, 2e3};
+    const SymTensor<2> s{3e3, -5e3, 2e3};
     const std::string block = soil + box("block", 1, 1, 3, 3);
     for (const bool high : {true, false})
     {
@@ -305,11 +306,11 @@ TEST(FemStatic, ADoorHoldsNothingOnceOpen)
                          fmt::format("door = [2.0, 4.0]\ndoor_opens = {}\n", opens),
                      {"fem.analysis=static"});
         const auto solver = solved(scene);
-        const Points& q = solver->bodies()[0].points;
+        const Points<2>& q = solver->bodies()[0].points;
         double lowest = 0;
         for (std::size_t p = 0; p < q.count; ++p)
-            if (q.Y[p] < 0.2 && q.X[p] > 2.5 && q.X[p] < 3.5)
-                lowest = std::min(lowest, q.y[p] - q.Y[p]);
+            if (q.X[1][p] < 0.2 && q.X[0][p] > 2.5 && q.X[0][p] < 3.5)
+                lowest = std::min(lowest, q.x[1][p] - q.X[1][p]);
         EXPECT_EQ(lowest < -1e-3, opens < 1) << lowest;
     }
 }
@@ -343,7 +344,7 @@ TEST(FemOperators, LinearFieldHasItsStressItsEnergyAndNoForceInside)
     for (const char* method : {"fem-q1", "fem-q2"})
     {
         const Scene scene = column({"fem.analysis=static"}, method);
-        const Lattice lattice = mesh_lattice(scene);
+        const Lattice<2> lattice = mesh_lattice(scene);
         Elasticity elasticity(scene, lattice, [](const std::string&) {});
         elasticity.assemble(MassKind::none);
         const double xx = 2e-3, xy = -1e-3, yx = 4e-3, yy = -3e-3;
@@ -356,18 +357,18 @@ TEST(FemOperators, LinearFieldHasItsStressItsEnergyAndNoForceInside)
         std::vector<Body> bodies = make_bodies(scene, lattice, {});
         Sampler(scene, lattice, elasticity.dofs(), bodies).sample(u, bodies);
         const double sxx = (lame + 2 * shear) * xx + lame * yy, syy = lame * xx + (lame + 2 * shear) * yy, sxy = shear * (xy + yx);
-        const Points& q = bodies[0].points;
+        const Points<2>& q = bodies[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
         {
-            EXPECT_NEAR(q.sxx[p], sxx, 1e-12 * E);
-            EXPECT_NEAR(q.syy[p], syy, 1e-12 * E);
-            EXPECT_NEAR(q.sxy[p], sxy, 1e-12 * E);
-            EXPECT_NEAR(q.x[p] - q.X[p], xx * q.X[p] + xy * q.Y[p], 1e-14);
+            EXPECT_NEAR(q.stress[0][p], sxx, 1e-12 * E);
+            EXPECT_NEAR(q.stress[1][p], syy, 1e-12 * E);
+            EXPECT_NEAR(q.stress[2][p], sxy, 1e-12 * E);
+            EXPECT_NEAR(q.x[0][p] - q.X[0][p], xx * q.X[0][p] + xy * q.X[1][p], 1e-14);
         }
         Vector force(u.size());
         elasticity.stiffness().vmult(force, u);
         EXPECT_NEAR(force * u, (sxx * xx + syy * yy + sxy * (xy + yx)) * 2 * H, 1e-10 * E);
-        Vec2 on_top{0, 0};
+        Vec<2> on_top{0, 0};
         for (std::size_t dof = 0; dof < u.size(); ++dof)
         {
             const auto& X = elasticity.nodes()[dof];
@@ -430,9 +431,9 @@ TEST(FemDynamic, FreeFlightKeepsMomentumAndStaysFreeOfStress)
         EXPECT_NEAR(sums.momentum[0], 2 * mass, 1e-12 * 2 * mass);
         EXPECT_NEAR(sums.momentum[1], mass, 1e-12 * 2 * mass);
         EXPECT_LT(largest_stress(*solver), 1e-13 * E);
-        const Points& q = solver->bodies()[0].points;
+        const Points<2>& q = solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            EXPECT_NEAR(q.x[p] - q.X[p], 200 * dt, 1e-12);
+            EXPECT_NEAR(q.x[0][p] - q.X[0][p], 200 * dt, 1e-12);
         EXPECT_NEAR(solver->velocity(0, 0)[0], 2, 1e-11);
     }
 }
@@ -446,8 +447,8 @@ TEST(FemDynamic, FreeFallIsExactFromTheFirstStep)
             const auto solver = solver_of(scene);
             const double dt = 1e-3, t = steps * dt;
             run(*solver, dt, steps);
-            const Points& q = solver->bodies()[0].points;
-            EXPECT_NEAR(q.y[5] - q.Y[5], -0.5 * g * t * t, 1e-14) << integrator;
+            const Points<2>& q = solver->bodies()[0].points;
+            EXPECT_NEAR(q.x[1][5] - q.X[1][5], -0.5 * g * t * t, 1e-14) << integrator;
             EXPECT_NEAR(solver->sums().momentum[1], -rho * 4 * g * t, 1e-10 * rho) << integrator;
         }
 }
@@ -482,8 +483,8 @@ TEST(FemDynamic, SuddenGravityReachesTwiceTheStaticSettlement)
         const int n = 1000;
         const double dt = 2 * H / c / n;
         run(*solver, dt, n);
-        const Points& q = solver->bodies()[0].points;
-        const double at_top = q.y[q.count - 1] - q.Y[q.count - 1];
+        const Points<2>& q = solver->bodies()[0].points;
+        const double at_top = q.x[1][q.count - 1] - q.X[1][q.count - 1];
         EXPECT_NEAR(at_top, -2 * settlement, 0.01 * settlement) << integrator;
     }
 }
@@ -589,9 +590,9 @@ TEST(FemScene, WarnsOfASteppedDisk)
     const auto solver = make_fem(scene, [&](const std::string& message) { warning = message; });
     EXPECT_NE(warning.find("stepped"), std::string::npos) << warning;
     // its points beyond the steps take values of the mesh
-    const Points& q = solver->bodies()[0].points;
+    const Points<2>& q = solver->bodies()[0].points;
     for (std::size_t p = 0; p < q.count; ++p)
-        EXPECT_NEAR(solver->velocity(0, p)[0], 3 - q.Y[p], 1.0);
+        EXPECT_NEAR(solver->velocity(0, p)[0], 3 - q.X[1][p], 1.0);
 }
 
 TEST(FemScene, RunWritesAFile)

@@ -264,15 +264,15 @@ TEST(PlasticWork, BetweenTwoSamples)
                                          "dilatancy_angle = 0.2\n"),
                                    "lpfdm");
     auto bodies = make_bodies(scene, make_lattice(scene.grid), {.box = true});
-    Points& q = bodies[0].points;
+    Points<2>& q = bodies[0].points;
     PlasticWork work;
     const auto sample = [&](double shear, double sxx, double syy)
     {
         for (std::size_t p = 0; p < q.count; ++p)
         {
             q.plastic_shear[p] = shear;
-            q.sxx[p] = sxx;
-            q.syy[p] = syy;
+            q.stress[0][p] = sxx;
+            q.stress[1][p] = syy;
             q.szz[p] = 0.5 * (sxx + syy);
         }
         return work.add(bodies);
@@ -453,14 +453,14 @@ TEST(Guards, UnresolvedEnergy)
     const Scene scene = test::load(block("", 1, 0.5, "law = \"linear_elastic\"", ""), "mpm-linear",
                                    {"grid.size=[34.0, 3.0]", "body.block.max=[32.0, 2.0]", "body.block.points_per_cell=4"});
     const auto solver = make_mpm(scene);
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     const auto share = [&](double cells)
     {
         double all = 0;
         const auto wave = [&](std::size_t b, std::size_t p) {
-            return Vec2{std::cos(2 * std::numbers::pi * solver->bodies()[b].points.x[p] / (0.25 * cells)), 0};
+            return Vec<2>{std::cos(2 * std::numbers::pi * solver->bodies()[b].points.x[0][p] / (0.25 * cells)), 0};
         };
-        const Points& q = solver->bodies()[0].points;
+        const Points<2>& q = solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
             all += 0.5 * q.mass * wave(0, p)[0] * wave(0, p)[0];
         return unresolved_energy(solver->bodies(), lattice, 0.25, wave) / all;
@@ -468,7 +468,7 @@ TEST(Guards, UnresolvedEnergy)
     for (const double n : {4.0, 8.0, 16.0})
         EXPECT_NEAR(share(n) / std::pow((1 - std::cos(2 * std::numbers::pi / n)) / 3, 2), 1, 0.25) << n;
     EXPECT_GT(share(2), 0.4);
-    EXPECT_LT(unresolved_energy(solver->bodies(), lattice, 0.25, [](std::size_t, std::size_t) { return Vec2{1, 2}; }), 1e-20);
+    EXPECT_LT(unresolved_energy(solver->bodies(), lattice, 0.25, [](std::size_t, std::size_t) { return Vec<2>{1, 2}; }), 1e-20);
 }
 
 /// A bar pulled to one and a half times its length at 0.004 of the wave speed, which parts.
@@ -512,7 +512,7 @@ TEST(Guards, MomentumHourglassGravityDrift)
             if constexpr (requires { change(s, k); })
                 change(s, k);
             else
-                change(s, const_cast<Points&>(solver->bodies()[0].points), k);
+                change(s, const_cast<Points<2>&>(solver->bodies()[0].points), k);
             guards.watch(s, *solver);
         }
         std::string all;
@@ -545,11 +545,11 @@ TEST(Guards, MomentumHourglassGravityDrift)
     // of the highest points alone
     const auto nod = [](double drift)
     {
-        return [drift](GuardSample&, Points& q, int k)
+        return [drift](GuardSample&, Points<2>& q, int k)
         {
             const auto fall = [&](int n) { return 0.1 * (1 - std::cos(0.5 * n)) + 0.1 * drift * n / 2000; };
             for (std::size_t p = 0; p < q.count && k > 0; ++p)
-                q.y[p] -= fall(k) - fall(k - 1);
+                q.x[1][p] -= fall(k) - fall(k - 1);
         };
     };
     EXPECT_EQ(codes(floor_y + gravity, nod(0.008), 2000), "");
@@ -560,16 +560,16 @@ TEST(Guards, MomentumHourglassGravityDrift)
 TEST(PointSums, OfASqueezedAndShearedBody)
 {
     const Scene scene = test::load(block(""), "lpfdm");
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     auto bodies = make_bodies(scene, lattice, {.box = true});
-    Points& q = bodies[0].points;
+    Points<2>& q = bodies[0].points;
     const double E = 1e5, nu = 0.3, shear = E / (2 * (1 + nu)), initial = static_cast<double>(q.count) * q.initial_volume;
     for (std::size_t p = 0; p < q.count; ++p)
     {
-        q.half_y[p] *= 0.5;
-        q.sxx[p] = 300;
-        q.syy[p] = -200;
-        q.sxy[p] = -700;
+        q.half_width[1][p] *= 0.5;
+        q.stress[0][p] = 300;
+        q.stress[1][p] = -200;
+        q.stress[2][p] = -700;
     }
     q.weight_share = 0.25;
     const PointSums sums = point_sums(bodies, lattice);
@@ -727,7 +727,7 @@ TEST(ConnectedParts, ByCommonNodes)
 {
     const auto at = [](std::initializer_list<std::pair<int, int>> cells)
     {
-        std::vector<Bin> bins;
+        std::vector<Bin<2>> bins;
         for (const auto& [i, j] : cells)
             bins.push_back({i, j, 0, 1});
         return bins;
@@ -743,21 +743,21 @@ TEST(ConnectedParts, ByCommonNodes)
 
 TEST(Diagnosis, CheckerboardOfTheVelocity)
 {
-    const Lattice lattice({0, 0}, 1, 4, 4);
-    Nodes nodes(lattice.nodes());
+    const Lattice<2> lattice({0, 0}, 1, {4, 4});
+    Nodes<2> nodes(lattice.nodes());
     std::vector<std::uint32_t> active;
     for (int j = 0; j <= 4; ++j)
         for (int i = 0; i <= 4; ++i)
         {
-            const auto n = lattice.node(i, j);
+            const auto n = lattice.node({i, j});
             active.push_back(static_cast<std::uint32_t>(n));
             nodes.mass[n] = 1;
-            nodes.vx[n] = (i + j) % 2 ? -1 : 1;
+            nodes.v[0][n] = (i + j) % 2 ? -1 : 1;
         }
     nodes.set_active(active);
     EXPECT_NEAR(checkerboard_share(lattice, nodes), 1, 1e-12);
     for (const auto n : active)
-        nodes.vx[n] = 1 + 0.1 * lattice.node_i(n) - 0.2 * lattice.node_j(n);
+        nodes.v[0][n] = 1 + 0.1 * lattice.node_index(n)[0] - 0.2 * lattice.node_index(n)[1];
     EXPECT_NEAR(checkerboard_share(lattice, nodes), 0, 1e-12);
     EXPECT_EQ(mass_of_fastest(nodes, 2), 0.5);
 }
@@ -766,15 +766,15 @@ TEST(Diagnosis, CheckerboardOfTheVelocity)
 TEST(Diagnosis, OscillationOfTheStress)
 {
     const Scene scene = test::load(block(""), "lpfdm", {"body.block.points_per_cell=2"});
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     auto bodies = make_bodies(scene, lattice, {.box = true});
-    Points& q = bodies[0].points;
+    Points<2>& q = bodies[0].points;
     for (const double between : {0.0, 1.0})
     {
         for (std::size_t p = 0; p < q.count; ++p)
         {
-            const double within = static_cast<int>(std::floor(q.x[p] / 0.125)) % 2 ? 1 : -1;
-            q.sxx[p] = q.syy[p] = within + between * (static_cast<int>(std::floor(q.x[p] / 0.25)) % 2 ? 1 : -1);
+            const double within = static_cast<int>(std::floor(q.x[0][p] / 0.125)) % 2 ? 1 : -1;
+            q.stress[0][p] = q.stress[1][p] = within + between * (static_cast<int>(std::floor(q.x[0][p] / 0.25)) % 2 ? 1 : -1);
         }
         EXPECT_NEAR(stress_oscillation(bodies, lattice), std::sqrt(1 / (1 + between)), 1e-12);
     }
@@ -784,15 +784,15 @@ TEST(Diagnosis, OscillationOfTheStress)
 TEST(Guards, StressErrorOfEachComponent)
 {
     const Scene scene = test::load(block(""), "lpfdm", {"body.block.points_per_cell=4"});
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     auto bodies = make_bodies(scene, lattice, {.box = true});
-    Points& q = bodies[0].points;
-    for (Field<double>* s : {&q.sxx, &q.syy, &q.sxy})
+    Points<2>& q = bodies[0].points;
+    for (Field<double>* s : {&q.stress[0], &q.stress[1], &q.stress[2]})
     {
         for (std::size_t p = 0; p < q.count; ++p)
         {
-            q.sxx[p] = q.syy[p] = q.sxy[p] = 0;
-            (*s)[p] = (static_cast<int>(std::floor(q.x[p] / 0.0625)) + static_cast<int>(std::floor(q.y[p] / 0.0625))) % 2 ? 1 : -1;
+            q.stress[0][p] = q.stress[1][p] = q.stress[2][p] = 0;
+            (*s)[p] = (static_cast<int>(std::floor(q.x[0][p] / 0.0625)) + static_cast<int>(std::floor(q.x[1][p] / 0.0625))) % 2 ? 1 : -1;
         }
         EXPECT_NEAR(stress_error(bodies, lattice, 0.25), 1, 0.05);
     }

@@ -14,13 +14,13 @@ using test::all_methods;
 using test::make;
 
 /// Sum of the forces at nodes that can move by them.
-Vec2 force_on(const Solver& solver)
+Vec<2> force_on(const Solver& solver)
 {
-    const Nodes& nodes = *solver.nodes().second;
-    Vec2 sum{0, 0};
+    const Nodes<2>& nodes = *solver.nodes().second;
+    Vec<2> sum{0, 0};
     for (const auto n : nodes.active())
         if (nodes.mass[n] > 0)
-            sum = {sum[0] + nodes.fx[n], sum[1] + nodes.fy[n]};
+            sum = {sum[0] + nodes.f[0][n], sum[1] + nodes.f[1][n]};
     return sum;
 }
 }  // namespace
@@ -83,17 +83,17 @@ TEST(VolumeCap, LimitsTheForceOfAGrownPoint)
         const auto solver = make(test::load(test::soil_block({1, 1}, {2, 2}), "lpfdm-2000",
                                             {"body.soil.points_per_cell=1", "lpfdm.volume_cap=" + std::to_string(cap)}));
         solver->prepare(0, 1e-12);
-        auto& q = const_cast<Points&>(solver->bodies()[0].points);
+        auto& q = const_cast<Points<2>&>(solver->bodies()[0].points);
         for (std::size_t p = 0; p < q.count; ++p)
         {
             q.volume[p] = 3 * q.initial_volume;
-            q.sxx[p] = 1000;
+            q.stress[0][p] = 1000;
         }
         solver->advance(1e-12);
         solver->prepare(1e-12, 1e-12);
         double sum = 0;
         for (const auto n : solver->nodes().second->active())
-            sum += std::abs(solver->nodes().second->fx[n]);
+            sum += std::abs(solver->nodes().second->f[0][n]);
         return sum;
     };
     EXPECT_GT(force(0), 0);
@@ -107,11 +107,11 @@ TEST(Guards, PartsThatMeetAgain)
     const Scene scene = test::load(test::soil_block({1, 1}, {2, 2}), "lpfdm");
     const auto solver = make(scene);
     Guards guards(scene, *solver, 1);
-    auto& q = const_cast<Points&>(solver->bodies()[0].points);
+    auto& q = const_cast<Points<2>&>(solver->bodies()[0].points);
     const auto look = [&](double way)
     {
         for (std::size_t p = 0; p < q.count; ++p)
-            q.x[p] += q.x[p] > 1.5 ? way : 0;
+            q.x[0][p] += q.x[0][p] > 1.5 ? way : 0;
         solver->prepare(0, 1e-9);
         solver->advance(1e-9);
         solver->prepare(1e-9, 1e-9);

@@ -29,17 +29,17 @@ template <class Support>
 struct RandomState
 {
     Scene scene = test::load(test::two_bodies());
-    LpfdmGrid grid{make_lattice(scene.grid)};
+    LpfdmGrid<2> grid{make_lattice(scene.grid)};
     std::vector<Body> bodies = make_bodies(scene, grid.lattice, {.box = Support::has_box});
     std::vector<double> workspace;
 
     explicit RandomState(unsigned seed)
     {
         test::Random random(seed);
-        std::vector<const Bins*> bins;
+        std::vector<const Bins<2>*> bins;
         for (Body& body : bodies)
         {
-            Points& q = body.points;
+            Points<2>& q = body.points;
             random.points(q);
             body.bins.rebuild<Support>(q, workspace);
             bins.push_back(&body.bins);
@@ -51,8 +51,8 @@ struct RandomState
         nodal_forces(grid);
         for (const auto n : grid.nodes.active())
         {
-            grid.nodes.vx[n] = random(-1, 1);
-            grid.nodes.vy[n] = random(-1, 1);
+            grid.nodes.v[0][n] = random(-1, 1);
+            grid.nodes.v[1][n] = random(-1, 1);
         }
     }
 };
@@ -63,12 +63,12 @@ void check_virtual_work()
     for (unsigned seed = 1; seed < 20; ++seed)
     {
         RandomState<Support> state(seed);
-        LpfdmGrid& grid = state.grid;
+        LpfdmGrid<2>& grid = state.grid;
         const double dt = 1e-3;
         double nodal = 0, mass = 0;
         for (const auto n : grid.nodes.active())
         {
-            nodal += (grid.nodes.fx[n] * grid.nodes.vx[n] + grid.nodes.fy[n] * grid.nodes.vy[n]) * dt;
+            nodal += (grid.nodes.f[0][n] * grid.nodes.v[0][n] + grid.nodes.f[1][n] * grid.nodes.v[1][n]) * dt;
             mass += grid.nodes.mass[n];
         }
         cell_gradients(grid, dt);
@@ -78,18 +78,18 @@ void check_virtual_work()
         double work = 0, total = 0, scale = 0;
         for (Body& body : state.bodies)
         {
-            const Points& q = body.points;
+            const Points<2>& q = body.points;
             total += q.mass * static_cast<double>(q.count);
-            for (const Bin& bin : body.bins.list())
+            for (const Bin<2>& bin : body.bins.list())
             {
                 const BinMotion<Support> motion(grid, bin, at_start);
-                const BinFrame frame(grid.lattice, bin, motion.origin());
+                const BinFrame<2> frame(grid.lattice, bin, motion.origin());
                 for (std::size_t p = bin.begin; p < bin.end; ++p)
                 {
-                    Pack x(0.0), y(0.0);
-                    const Gradient<Pack> d =
-                        motion(frame.box<Support>(q, p, AllLanes{}, AllLanes{}.load(&q.x[p]), AllLanes{}.load(&q.y[p])), dt, x, y);
-                    const double power = q.current_volume(p) * (q.sxx[p] * d.xx[0] + q.syy[p] * d.yy[0] + q.sxy[p] * (d.xy[0] + d.yx[0]));
+                    Vec<2, Pack> x{Pack(0.0), Pack(0.0)};
+                    const Gradient<2, Pack> d = motion(frame.box<Support>(q, p, AllLanes{}, load(q.x, p, AllLanes{})), dt, x);
+                    const double power =
+                        q.current_volume(p) * (q.stress[0][p] * d.xx[0] + q.stress[1][p] * d.yy[0] + q.stress[2][p] * (d.xy[0] + d.yx[0]));
                     work += power;
                     scale += std::abs(power);
                 }
@@ -126,20 +126,20 @@ TEST(Forces, PatchOfShiftedPoints)
             LpfdmGrid grid(make_lattice(scene.grid));
             auto bodies = make_bodies(scene, grid.lattice, {.box = Support::has_box});
             std::vector<double> workspace;
-            Points& q = bodies[0].points;
+            Points<2>& q = bodies[0].points;
             for (std::size_t p = 0; p < q.count; ++p)
             {
-                q.sxx[p] = q.syy[p] = q.sxy[p] = 1;
-                q.x[p] = 3.5 + stretch * (q.x[p] - 3.5);
-                q.y[p] = 3.5 + stretch * (q.y[p] - 3.5);
+                q.stress[0][p] = q.stress[1][p] = q.stress[2][p] = 1;
+                q.x[0][p] = 3.5 + stretch * (q.x[0][p] - 3.5);
+                q.x[1][p] = 3.5 + stretch * (q.x[1][p] - 3.5);
                 if (Support::has_box)
                 {
-                    q.half_x[p] *= stretch;
-                    q.half_y[p] *= stretch;
+                    q.half_width[0][p] *= stretch;
+                    q.half_width[1][p] *= stretch;
                 }
             }
             bodies[0].bins.template rebuild<Support>(q, workspace);
-            const Bins* bins = &bodies[0].bins;
+            const Bins<2>* bins = &bodies[0].bins;
             grid.template rebuild<Support::S>({&bins, 1});
             LpfdmSums<Support> sums;
             sums.update(grid.lattice, bodies);
@@ -148,8 +148,8 @@ TEST(Forces, PatchOfShiftedPoints)
             double largest = 0;
             for (int j = 3; j <= 5; ++j)
                 for (int i = 3; i <= 5; ++i)
-                    largest = std::max(
-                        {largest, std::abs(grid.nodes.fx[grid.lattice.node(i, j)]), std::abs(grid.nodes.fy[grid.lattice.node(i, j)])});
+                    largest = std::max({largest, std::abs(grid.nodes.f[0][grid.lattice.node({i, j})]),
+                                        std::abs(grid.nodes.f[1][grid.lattice.node({i, j})])});
             return largest;
         };
         return scene.options<LpfdmSpec>().support == LpfdmSpec::Support::point ? measure(PointSupport{}) : measure(DomainSupport{});
@@ -189,7 +189,7 @@ TEST_P(LpfdmOracle, SameTrajectories)
         wave_speed = std::max(wave_speed, std::sqrt(moduli(body.material).constrained() * body.points.initial_volume / body.points.mass));
     reference.hourglass_rate = scene.options<LpfdmSpec>().hourglass * wave_speed / 0.5;
     const std::size_t first_body = solver->bodies()[0].points.count;
-    const auto velocity = [&](std::size_t p, Vec2 x)
+    const auto velocity = [&](std::size_t p, Vec<2> x)
     {
         const VectorExpression v(*scene.bodies[p < first_body ? 0 : 1].velocity, {});
         return v({x[0], x[1], x[0], x[1], 0});
@@ -229,9 +229,9 @@ TEST(Frontier, MovesWithoutANewBin)
         solver->prepare(n * 0.01, 0.01);
         solver->advance(0.01);
     }
-    const Points& q = solver->bodies()[0].points;
+    const Points<2>& q = solver->bodies()[0].points;
     for (std::size_t p = 0; p < q.count; ++p)
-        EXPECT_LT(std::abs(q.sxx[p]) + std::abs(q.syy[p]) + std::abs(q.sxy[p]), 1e-3) << p;
+        EXPECT_LT(std::abs(q.stress[0][p]) + std::abs(q.stress[1][p]) + std::abs(q.stress[2][p]), 1e-3) << p;
 }
 
 /// Claim of the paper that hourglass deformation does not occur: the pattern (+1, -1, -1, +1) keeps its amplitude without control
@@ -261,17 +261,17 @@ TEST(Hourglass, CheckerboardNeedsControl)
 TEST(Convection, LinearField)
 {
     RandomState<PointSupport> state(3);
-    LpfdmGrid& grid = state.grid;
-    const Gradient<> g{0.3, -0.2, 0.7, 0.4};
+    LpfdmGrid<2>& grid = state.grid;
+    const Gradient<2> g{0.3, -0.2, 0.7, 0.4};
     const double dt = 0.02;
-    const auto field = [&](const Vec2& x) { return Vec2{1 + g.xx * x[0] + g.xy * x[1], -1 + g.yx * x[0] + g.yy * x[1]}; };
+    const auto field = [&](const Vec<2>& x) { return Vec<2>{1 + g.xx * x[0] + g.xy * x[1], -1 + g.yx * x[0] + g.yy * x[1]}; };
     const auto check = [&](auto scheme)
     {
         for (const auto n : grid.nodes.active())
         {
-            const Vec2 v = field(grid.lattice.node_position(n));
-            grid.nodes.vx[n] = v[0];
-            grid.nodes.vy[n] = v[1];
+            const Vec<2> v = field(grid.lattice.node_position(n));
+            grid.nodes.v[0][n] = v[0];
+            grid.nodes.v[1][n] = v[1];
         }
         cell_gradients(grid, dt);
         convect<decltype(scheme)>(grid, dt);
@@ -283,14 +283,14 @@ TEST(Convection, LinearField)
                 surrounded = surrounded && grid.cells.mass[grid.around(grid.first_cell(n), k)] > 0;
             if (!surrounded)
                 continue;
-            const Vec2 v = field(grid.lattice.node_position(n));
+            const Vec<2> v = field(grid.lattice.node_position(n));
             // central: the node takes the velocity at x - dt v'; upwind: eq. (13), at x - dt v
             const bool solved = std::is_same_v<decltype(scheme), CentralConvection>;
-            const Vec2 w = solved ? Vec2{grid.nodes.vx[n], grid.nodes.vy[n]} : v;
-            const Vec2 x = grid.lattice.node_position(n);
-            const Vec2 arrives = field({x[0] - dt * w[0], x[1] - dt * w[1]});
-            EXPECT_NEAR(grid.nodes.vx[n], arrives[0], 1e-13);
-            EXPECT_NEAR(grid.nodes.vy[n], arrives[1], 1e-13);
+            const Vec<2> w = solved ? Vec<2>{grid.nodes.v[0][n], grid.nodes.v[1][n]} : v;
+            const Vec<2> x = grid.lattice.node_position(n);
+            const Vec<2> arrives = field({x[0] - dt * w[0], x[1] - dt * w[1]});
+            EXPECT_NEAR(grid.nodes.v[0][n], arrives[0], 1e-13);
+            EXPECT_NEAR(grid.nodes.v[1][n], arrives[1], 1e-13);
             ++inside;
         }
         EXPECT_GT(inside, 1);
@@ -311,9 +311,9 @@ TEST(Lpfdm, SameBitsForAnyThreads)
             solver->advance(5e-3);
         }
         solver->prepare(0, 5e-3);
-        const Points& q = solver->bodies()[0].points;
-        std::vector<double> out(q.sxx.data(), q.sxx.data() + q.count);
-        out.insert(out.end(), q.x.data(), q.x.data() + q.count);
+        const Points<2>& q = solver->bodies()[0].points;
+        std::vector<double> out(q.stress[0].data(), q.stress[0].data() + q.count);
+        out.insert(out.end(), q.x[0].data(), q.x[0].data() + q.count);
         out.push_back(solver->sums().kinetic_energy);
         set_threads(1);
         return out;

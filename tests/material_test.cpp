@@ -10,12 +10,12 @@ namespace
 const ElasticModuli moduli_of_test(2.5e6, 0.3);
 
 template <class Law>
-SymTensor<> simple_shear(double total, int steps)
+SymTensor<2> simple_shear(double total, int steps)
 {
     const Law law{moduli_of_test};
     typename Law::template State<double> state;
     for (int n = 0; n < steps; ++n)
-        law.update(state, Gradient<>{0, 0, total / steps, 0});
+        law.update(state, Gradient<2>{0, 0, total / steps, 0});
     return state.stress;
 }
 }  // namespace
@@ -32,13 +32,13 @@ TEST(Elastic, UniaxialStrainAndStress)
 {
     const LinearElastic law{moduli_of_test};
     LinearElastic::State<double> state;
-    law.update(state, Gradient<>{0, 1e-3, 0, 0});
+    law.update(state, Gradient<2>{0, 1e-3, 0, 0});
     const double nu = 0.3, M = moduli_of_test.constrained();
     EXPECT_NEAR(state.stress.yy, M * 1e-3, 1e-9);
     EXPECT_NEAR(state.stress.xx, nu / (1 - nu) * M * 1e-3, 1e-9);
     // plane strain, no lateral stress: slope E / (1 - nu^2)
     state = {};
-    law.update(state, Gradient<>{-nu / (1 - nu) * 1e-3, 1e-3, 0, 0});
+    law.update(state, Gradient<2>{-nu / (1 - nu) * 1e-3, 1e-3, 0, 0});
     EXPECT_NEAR(state.stress.xx, 0, 1e-9);
     EXPECT_NEAR(state.stress.yy, 2.5e6 / (1 - nu * nu) * 1e-3, 1e-9);
 }
@@ -51,9 +51,9 @@ TEST(Elastic, EnergyDensity)
     for (int trial = 0; trial < 50; ++trial)
     {
         LinearElastic::State<double> state;
-        const Gradient<> d{random(-1, 1), random(-1, 1), random(-1, 1), random(-1, 1)};
+        const Gradient<2> d{random(-1, 1), random(-1, 1), random(-1, 1), random(-1, 1)};
         law.update(state, d);
-        const SymTensor<>& s = state.stress;
+        const SymTensor<2>& s = state.stress;
         const double work = 0.5 * (s.xx * d.xx + s.yy * d.yy + s.xy * d.shear());
         EXPECT_NEAR(ElasticPart{moduli_of_test}.energy_density(s, 0.3 * (s.xx + s.yy)), work, 1e-9 * work);
     }
@@ -84,24 +84,24 @@ TEST(LinearElastic, SimpleShearHasNoNormalStress)
 /// A rigid turn rotates the stress: the exact form to rounding in 100 steps, the Jaumann form to first order.
 TEST(Rotation, RigidTurn)
 {
-    const SymTensor<> start{3, -1, 0.5};
+    const SymTensor<2> start{3, -1, 0.5};
     const double angle = 2 * std::numbers::pi / 3, step = angle / 100;
     const double c = std::cos(angle), s = std::sin(angle);
-    const SymTensor<> turned{c * c * start.xx + s * s * start.yy - 2 * c * s * start.xy,
-                             s * s * start.xx + c * c * start.yy + 2 * c * s * start.xy,
-                             c * s * (start.xx - start.yy) + (c * c - s * s) * start.xy};
+    const SymTensor<2> turned{c * c * start.xx + s * s * start.yy - 2 * c * s * start.xy,
+                              s * s * start.xx + c * c * start.yy + 2 * c * s * start.xy,
+                              c * s * (start.xx - start.yy) + (c * c - s * s) * start.xy};
     HypoelasticExactRotation::State<double> exact{start};
     HypoelasticJaumann::State<double> first{start};
     for (int n = 0; n < 100; ++n)
     {
-        HypoelasticExactRotation{moduli_of_test}.update(exact, Gradient<>{0, 0, -step, step});
-        HypoelasticJaumann{moduli_of_test}.update(first, Gradient<>{0, 0, -step, step});
+        HypoelasticExactRotation{moduli_of_test}.update(exact, Gradient<2>{0, 0, -step, step});
+        HypoelasticJaumann{moduli_of_test}.update(first, Gradient<2>{0, 0, -step, step});
     }
     EXPECT_NEAR(exact.stress.xx, turned.xx, 1e-12);
     EXPECT_NEAR(exact.stress.yy, turned.yy, 1e-12);
     EXPECT_NEAR(exact.stress.xy, turned.xy, 1e-12);
     EXPECT_NEAR(first.stress.xx, turned.xx, 0.2);
-    const auto invariant = [](const SymTensor<>& t) { return std::hypot(0.5 * (t.xx - t.yy), t.xy); };
+    const auto invariant = [](const SymTensor<2>& t) { return std::hypot(0.5 * (t.xx - t.yy), t.xy); };
     EXPECT_GT(invariant(first.stress) / invariant(start), 1.02);  // what first order costs
     EXPECT_NEAR(invariant(exact.stress), invariant(start), 1e-12);
 }
@@ -112,32 +112,32 @@ TEST(Batch, EqualsPointFunction)
     test::Random random(5);
     const auto check = [&](auto law, bool varies)
     {
-        Points q;
+        Points<2> q;
         const std::size_t n = pack_size + 3;
         q.count = n;
-        for (Field<double>* f : {&q.sxx, &q.syy, &q.sxy, &q.stiffness})
+        for (Field<double>* f : {&q.stress[0], &q.stress[1], &q.stress[2], &q.stiffness})
             f->activate(n);
-        std::vector<SymTensor<>> start(n);
+        std::vector<SymTensor<2>> start(n);
         for (std::size_t p = 0; p < n; ++p)
         {
             start[p] = random.stress(1e3);
-            q.sxx[p] = start[p].xx;
-            q.syy[p] = start[p].yy;
-            q.sxy[p] = start[p].xy;
+            q.stress[0][p] = start[p].xx;
+            q.stress[1][p] = start[p].yy;
+            q.stress[2][p] = start[p].xy;
             q.stiffness[p] = random(0.1, 1);
         }
-        const Gradient<> d{1e-3, -2e-3, 3e-3, -4e-3};
+        const Gradient<2> d{1e-3, -2e-3, 3e-3, -4e-3};
         for_each_pack(0, n,
                       [&](std::size_t p, const auto& lanes) {
-                          law.update(q, p, lanes, Gradient<Pack>{Pack(d.xx), Pack(d.yy), Pack(d.xy), Pack(d.yx)});
+                          law.update(q, p, lanes, Gradient<2, Pack>{Pack(d.xx), Pack(d.yy), Pack(d.xy), Pack(d.yx)});
                       });
         for (std::size_t p = 0; p < n; ++p)
         {
             typename decltype(law)::template State<double> state{start[p]};
             law.update(state, d, varies ? q.stiffness[p] : 1.0);
-            EXPECT_NEAR(q.sxx[p], state.stress.xx, 1e-9);
-            EXPECT_NEAR(q.syy[p], state.stress.yy, 1e-9);
-            EXPECT_NEAR(q.sxy[p], state.stress.xy, 1e-9);
+            EXPECT_NEAR(q.stress[0][p], state.stress.xx, 1e-9);
+            EXPECT_NEAR(q.stress[1][p], state.stress.yy, 1e-9);
+            EXPECT_NEAR(q.stress[2][p], state.stress.xy, 1e-9);
         }
     };
     check(LinearElastic{moduli_of_test}, false);

@@ -143,7 +143,7 @@ TEST(Modes, NullSpaceOfFlip)
         const NullModes null = null_modes(c.map());
         kept = null.unseen_kept;
         // shape functions at the points, straight from the definition
-        const Points& q = c.solver->bodies()[0].points;
+        const Points<2>& q = c.solver->bodies()[0].points;
         Eigen::MatrixXd N = Eigen::MatrixXd::Zero(13 * 13, static_cast<Eigen::Index>(q.count));
         for (std::size_t p = 0; p < q.count; ++p)
             for (int j = 0; j < 13; ++j)
@@ -156,7 +156,7 @@ TEST(Modes, NullSpaceOfFlip)
                         return r < 0.5 ? 0.75 - r * r : r < 1.5 ? 0.5 * (1.5 - r) * (1.5 - r) : 0;
                     };
                     N(13 * j + i, static_cast<Eigen::Index>(p)) =
-                        is_spline ? spline(q.x[p] - i) * spline(q.y[p] - j) : hat(q.x[p] - i) * hat(q.y[p] - j);
+                        is_spline ? spline(q.x[0][p] - i) * spline(q.x[1][p] - j) : hat(q.x[0][p] - i) * hat(q.x[1][p] - j);
                 }
         Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(N);
         qr.setThreshold(1e-9);
@@ -228,7 +228,7 @@ TEST(Modes, CentralConvectionIsUnstableAtATrailingFace)
         std::map<int, double> columns;
         for (const auto n : map.all(Unknown::Kind::velocity))
         {
-            columns[map.unknowns[static_cast<std::size_t>(n)].node.i] += std::norm(s.modes.front().shape[n]);
+            columns[map.unknowns[static_cast<std::size_t>(n)].node[0]] += std::norm(s.modes.front().shape[n]);
         }
         const auto most =
             std::max_element(columns.begin(), columns.end(), [](const auto& a, const auto& b) { return a.second < b.second; });

@@ -149,7 +149,7 @@ TEST(MohrCoulomb, PlaneStrainCompression)
             {
                 const double lateral = 0.5 * (low + high);
                 trial = state;
-                law.update(trial, Gradient<>{lateral, -step, 0, 0});
+                law.update(trial, Gradient<2>{lateral, -step, 0, 0});
                 (trial.stress.xx > 0 ? high : low) = lateral;
             }
             state = trial;
@@ -174,7 +174,7 @@ TEST(MohrCoulomb, LinearSofteningInSimpleShear)
         State state;
         const double total = c / G + 0.5 * strain;  // within the softening branch
         for (int n = 0; n < steps; ++n)
-            law.update(state, Gradient<>{0, 0, 0.5 * total / steps, 0.5 * total / steps});
+            law.update(state, Gradient<2>{0, 0, 0.5 * total / steps, 0.5 * total / steps});
         const double H = (1 - residual) * c / strain, plastic = (G * total - c) / (G - H);
         EXPECT_NEAR(state.plastic_shear_strain, plastic, 1e-10);
         EXPECT_NEAR(state.stress.xy, c - H * plastic, 1e-10 * c);
@@ -187,7 +187,7 @@ TEST(MohrCoulomb, TensionBreaksTheCohesion)
     const MohrCoulomb law = law_of(phi, c, 0, Softening::drop(0.5));
     State state;
     for (int n = 0; n < 100; ++n)
-        law.update(state, Gradient<>{1e-5, 1e-5, 0, 0});
+        law.update(state, Gradient<2>{1e-5, 1e-5, 0, 0});
     const double apex = 0.5 * c / std::tan(phi);
     EXPECT_NEAR(state.stress.xx, apex, 1e-9 * apex);
     EXPECT_GT(state.plastic_shear_strain, 0);
@@ -218,7 +218,7 @@ TEST(MohrCoulomb, RandomPaths)
         for (int n = 0; n < 1000000; ++n)
         {
             const double size = std::pow(10.0, random(-7, -1));
-            const Gradient<> d{random(-size, size), random(-size, size), random(-size, size), random(-size, size)};
+            const Gradient<2> d{random(-size, size), random(-size, size), random(-size, size), random(-size, size)};
             const State before = state;
             // the rotation is frame change, not work: the work is counted with the strain on the rotated stress
             law.update(state, d);
@@ -251,7 +251,7 @@ TEST(MohrCoulomb, ElasticPartRotates)
     double zz = 0;
     for (int n = 0; n < 200; ++n)
     {
-        const Gradient<> d{random(-1e-2, 1e-2), random(-1e-2, 1e-2), random(-0.1, 0.1), random(-0.1, 0.1)};
+        const Gradient<2> d{random(-1e-2, 1e-2), random(-1e-2, 1e-2), random(-0.1, 0.1), random(-0.1, 0.1)};
         law.update(state, d);
         HypoelasticExactRotation{soil}.update(elastic, d);
         zz += soil.lame() * d.trace();
@@ -287,14 +287,14 @@ TEST(MohrCoulomb, ClosedCyclesDissipate)
         const MohrCoulomb law = law_of(random(0, 0.7), random(0, 1e4), 0, Softening::linear(0.5, random(1e-3, 1e-2)));
         State state;
         double work = 0, scale = 0;
-        const Gradient<> a{random(-3e-3, 3e-3), random(-3e-3, 3e-3), random(-3e-3, 3e-3), 0};
-        const Gradient<> b{random(-3e-3, 3e-3), random(-3e-3, 3e-3), random(-3e-3, 3e-3), 0};
+        const Gradient<2> a{random(-3e-3, 3e-3), random(-3e-3, 3e-3), random(-3e-3, 3e-3), 0};
+        const Gradient<2> b{random(-3e-3, 3e-3), random(-3e-3, 3e-3), random(-3e-3, 3e-3), 0};
         const int steps = 2000;
         for (int n = 0; n < steps; ++n)
         {
             const double t = 2 * std::numbers::pi * n / steps, h = 2 * std::numbers::pi / steps;
             const double da = std::sin(t + h) - std::sin(t), db = std::cos(t + h) - std::cos(t);
-            Gradient<> d{a.xx * da + b.xx * db, a.yy * da + b.yy * db, 0, 0};
+            Gradient<2> d{a.xx * da + b.xx * db, a.yy * da + b.yy * db, 0, 0};
             d.xy = d.yx = 0.5 * (a.xy * da + b.xy * db);
             const State s = state;
             law.update(state, d);
@@ -314,10 +314,10 @@ TEST(MohrCoulomb, BatchEqualsPointFunction)
     const auto check = [](const auto& law, bool varying, bool nonlocal)
     {
         test::Random random(9);
-        Points q;
+        Points<2> q;
         const std::size_t n = 2 * pack_size + 3;
         q.count = n;
-        for (Field<double>* f : {&q.sxx, &q.syy, &q.sxy})
+        for (Field<double>* f : {&q.stress[0], &q.stress[1], &q.stress[2]})
             f->activate(n);
         law.allocate(q);
         std::vector<State> state(n);
@@ -355,23 +355,23 @@ TEST(MohrCoulomb, BatchEqualsPointFunction)
                           [&](std::size_t p, const auto& lanes)
                           {
                               const auto at = [&](const std::vector<double>& v) { return lanes.load(&v[p]); };
-                              law.update(q, p, lanes, Gradient<Pack>{at(xx), at(yy), at(xy), at(yx)});
+                              law.update(q, p, lanes, Gradient<2, Pack>{at(xx), at(yy), at(xy), at(yx)});
                           });
             for (std::size_t p = 0; p < n; ++p)
             {
                 const double before = state[p].plastic_shear_strain;
                 own[p].update(state[p], {xx[p], yy[p], xy[p], yx[p]});
                 const double level = 1e-9 * c;
-                EXPECT_NEAR(q.sxx[p], state[p].stress.xx, level);
-                EXPECT_NEAR(q.syy[p], state[p].stress.yy, level);
-                EXPECT_NEAR(q.sxy[p], state[p].stress.xy, level);
+                EXPECT_NEAR(q.stress[0][p], state[p].stress.xx, level);
+                EXPECT_NEAR(q.stress[1][p], state[p].stress.yy, level);
+                EXPECT_NEAR(q.stress[2][p], state[p].stress.xy, level);
                 EXPECT_NEAR(q.szz[p], state[p].stress_zz, level);
                 EXPECT_NEAR(q.plastic_shear[p], state[p].plastic_shear_strain, 1e-13);
                 if (state[p].plastic_shear_strain > before)
                     ++yielded;
                 else
                     ++elastic;
-                const SymTensor<>& s = state[p].stress;
+                const SymTensor<2>& s = state[p].stress;
                 const double mean = 0.5 * (s.xx + s.yy), radius = std::hypot(0.5 * (s.xx - s.yy), s.xy);
                 zz_first += state[p].plastic_shear_strain > before && state[p].stress_zz > mean + radius * 1.01;
                 zz_last += state[p].plastic_shear_strain > before && state[p].stress_zz < mean - radius * 1.01;
@@ -400,16 +400,16 @@ TEST(MohrCoulomb, BatchEqualsPointFunction)
 TEST(MohrCoulomb, BatchKeepsNaN)
 {
     const MohrCoulombField<false, true> law{law_of(phi, c, 0, Softening::linear(0.5, 2e-3))};
-    Points q;
+    Points<2> q;
     q.count = pack_size;
-    for (Field<double>* f : {&q.sxx, &q.syy, &q.sxy})
+    for (Field<double>* f : {&q.stress[0], &q.stress[1], &q.stress[2]})
         f->activate(q.count);
     law.allocate(q);
     q.softening_strain[0] = std::numeric_limits<double>::quiet_NaN();
-    law.update(q, 0, AllLanes{}, Gradient<Pack>{Pack(0.0), Pack(0.0), Pack(1e-3), Pack(1e-3)});
+    law.update(q, 0, AllLanes{}, Gradient<2, Pack>{Pack(0.0), Pack(0.0), Pack(1e-3), Pack(1e-3)});
     for (std::size_t p = 0; p < q.count; ++p)
     {
-        EXPECT_EQ(std::isfinite(q.sxy[p]), p > 0) << p;
+        EXPECT_EQ(std::isfinite(q.stress[2][p]), p > 0) << p;
         EXPECT_EQ(q.plastic_shear[p] > 0, p > 0) << p;
     }
 }

@@ -13,42 +13,42 @@ namespace
 struct Motion
 {
     double energy = 0, angular_momentum = 0;  ///< of the points, per mass
-    Vec2 momentum{0, 0};
+    Vec<2> momentum{0, 0};
 };
 
 /// Of the points' own velocity; the moment arms are those of `at`, by id.
-Motion motion(const Solver& solver, const std::vector<Vec2>& at)
+Motion motion(const Solver& solver, const std::vector<Vec<2>>& at)
 {
     Motion s;
     for (const Body& body : solver.bodies())
     {
-        const Points& q = body.points;
+        const Points<2>& q = body.points;
         for (std::size_t p = 0; p < q.count; ++p)
         {
-            const Vec2& x = at[q.id[p]];
-            s.energy += 0.5 * q.mass * (q.vx[p] * q.vx[p] + q.vy[p] * q.vy[p]);
-            s.momentum[0] += q.mass * q.vx[p];
-            s.momentum[1] += q.mass * q.vy[p];
-            s.angular_momentum += q.mass * (x[0] * q.vy[p] - x[1] * q.vx[p]);
+            const Vec<2>& x = at[q.id[p]];
+            s.energy += 0.5 * q.mass * (q.v[0][p] * q.v[0][p] + q.v[1][p] * q.v[1][p]);
+            s.momentum[0] += q.mass * q.v[0][p];
+            s.momentum[1] += q.mass * q.v[1][p];
+            s.angular_momentum += q.mass * (x[0] * q.v[1][p] - x[1] * q.v[0][p]);
         }
     }
     return s;
 }
 
-std::vector<Vec2> positions(const Solver& solver)
+std::vector<Vec<2>> positions(const Solver& solver)
 {
-    std::vector<Vec2> x;
+    std::vector<Vec<2>> x;
     for (const Body& body : solver.bodies())
         for (std::size_t p = 0; p < body.points.count; ++p)
         {
             x.resize(std::max<std::size_t>(x.size(), body.points.id[p] + std::size_t{1}));
-            x[body.points.id[p]] = {body.points.x[p], body.points.y[p]};
+            x[body.points.id[p]] = {body.points.x[0][p], body.points.x[1][p]};
         }
     return x;
 }
 
 /// A block of 4 x 4 points per cell with the given velocity.
-std::string moving_block(const std::string& vx, const std::string& vy, const Vec2& min = {1, 1}, const Vec2& max = {3, 3})
+std::string moving_block(const std::string& vx, const std::string& vy, const Vec<2>& min = {1, 1}, const Vec<2>& max = {3, 3})
 {
     return test::soil_block(min, max) + "velocity = [\"" + vx + "\", \"" + vy + "\"]\n";
 }
@@ -58,7 +58,7 @@ std::pair<Motion, Motion> before_and_after(const std::string& text, const std::s
                                            int steps, double dt)
 {
     const auto solver = make_mpm(test::load(text, method, settings));
-    std::vector<Vec2> at = positions(*solver);
+    std::vector<Vec<2>> at = positions(*solver);
     const Motion before = motion(*solver, at);
     for (int n = 0; n < steps; ++n)
     {
@@ -244,9 +244,9 @@ double stress_in_free_fall(const std::string& method, const std::vector<std::str
     {
         solver->prepare(n * 1e-3, 1e-3);
         solver->advance(1e-3);
-        const Points& q = solver->bodies()[0].points;
+        const Points<2>& q = solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            largest = std::max({largest, std::abs(q.sxx[p]), std::abs(q.syy[p]), std::abs(q.sxy[p])});
+            largest = std::max({largest, std::abs(q.stress[0][p]), std::abs(q.stress[1][p]), std::abs(q.stress[2][p])});
     }
     return largest / 1e6;
 }
@@ -297,9 +297,9 @@ velocity = ["3", "2"]
             solver->advance(0.01);
         }
         double largest = 0;
-        const Points& q = solver->bodies()[0].points;
+        const Points<2>& q = solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            largest = std::max({largest, std::abs(q.sxx[p]), std::abs(q.syy[p]), std::abs(q.sxy[p])});
+            largest = std::max({largest, std::abs(q.stress[0][p]), std::abs(q.stress[1][p]), std::abs(q.stress[2][p])});
         return largest / 1e6;
     };
     for (const char* method : {"mpm-linear", "mpm-linear-bbar", "mpm-bspline", "mpm-cpgimp"})
@@ -328,9 +328,9 @@ TEST(Remedies, SameBitsForAnyThreads)
             solver->prepare(0, 5e-3);
             solver->advance(5e-3);
         }
-        const Points& q = solver->bodies()[0].points;
-        std::vector<double> out(q.sxx.data(), q.sxx.data() + q.count);
-        out.insert(out.end(), q.vx.data(), q.vx.data() + q.count);
+        const Points<2>& q = solver->bodies()[0].points;
+        std::vector<double> out(q.stress[0].data(), q.stress[0].data() + q.count);
+        out.insert(out.end(), q.v[0].data(), q.v[0].data() + q.count);
         set_threads(1);
         return out;
     };

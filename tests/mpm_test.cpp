@@ -21,36 +21,35 @@ void check_virtual_work()
     {
         test::Random random(seed);
         const Scene scene = test::load(test::two_bodies());
-        const Lattice lattice = make_lattice(scene.grid);
+        const Lattice<2> lattice = make_lattice(scene.grid);
         auto bodies = make_bodies(scene, lattice, {.box = Shape::has_box, .velocity = true});
         Body& body = bodies[1];
-        Points& q = body.points;
+        Points<2>& q = body.points;
         random.points(q);
         std::vector<double> workspace;
         body.bins.rebuild<Shape>(q, workspace);
         Gather gather(lattice.nodes());
-        const Bins* bins = &body.bins;
-        gather.rebuild<Shape::S>({&bins, 1}, [&](int i, int j) { return lattice.node(i, j); });
+        const Bins<2>* bins = &body.bins;
+        gather.rebuild<Shape::S, 2>({&bins, 1}, [&](const Index<2>& at) { return lattice.node(at); });
         make_room(workspace, gather.blocks() * 2);
         scatter<Shape, Strain, Scatter::force>(lattice, body, 0, workspace);
-        std::vector<double> vx(lattice.nodes()), vy(lattice.nodes());
-        for (std::size_t n = 0; n < vx.size(); ++n)
-        {
-            vx[n] = random(-1, 1);
-            vy[n] = random(-1, 1);
-        }
+        VectorField<2> velocity{std::vector<double>(lattice.nodes()), std::vector<double>(lattice.nodes())};
+        for (std::size_t n = 0; n < lattice.nodes(); ++n)
+            set(velocity, n, {random(-1, 1), random(-1, 1)});
         double nodal = 0, work = 0, scale = 0;
-        gather.sum<2>(workspace, [&](std::size_t n, const std::array<double, 2>& f) { nodal += f[0] * vx[n] + f[1] * vy[n]; });
-        for (const Bin& bin : body.bins.list())
+        gather.sum<2>(workspace,
+                      [&](std::size_t n, const std::array<double, 2>& f) { nodal += f[0] * velocity[0][n] + f[1] * velocity[1][n]; });
+        for (const Bin<2>& bin : body.bins.list())
         {
             const BinFrame frame(lattice, bin);
             const typename Strain::template InBin<Shape> strain(lattice, q, bin);
-            const NodalVelocity<Shape::S> v(lattice, bin, vx, vy);
+            const NodalVelocity<Shape::S> v(lattice, bin, velocity);
             for (std::size_t p = bin.begin; p < bin.end; ++p)
             {
                 const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, AllLanes{}), frame.scale);
-                const Gradient<Pack> d = v.template gradient<Strain>(at, strain, 1.0);
-                const double power = q.current_volume(p) * (q.sxx[p] * d.xx[0] + q.syy[p] * d.yy[0] + q.sxy[p] * (d.xy[0] + d.yx[0]));
+                const Gradient<2, Pack> d = v.template gradient<Strain>(at, strain, 1.0);
+                const double power =
+                    q.current_volume(p) * (q.stress[0][p] * d.xx[0] + q.stress[1][p] * d.yy[0] + q.stress[2][p] * (d.xy[0] + d.yx[0]));
                 work += power;
                 scale += std::abs(power);
             }
@@ -83,26 +82,26 @@ TEST(MpmForces, VirtualWorkBSpline)
 TEST(MpmShape, BSplineAtTheEdges)
 {
     const Scene scene = test::load(test::soil_block({0, 0}, {4, 4}));
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     test::Random random(31);
     auto bodies = make_bodies(scene, lattice, {.velocity = true});
-    Points& q = bodies[0].points;
+    Points<2>& q = bodies[0].points;
     for (std::size_t p = 0; p < q.count; ++p)
     {
-        q.x[p] = random(0, 4);
-        q.y[p] = random(0, 4);
-        q.sxx[p] = random(-1, 1);
-        q.syy[p] = random(-1, 1);
-        q.sxy[p] = random(-1, 1);
+        q.x[0][p] = random(0, 4);
+        q.x[1][p] = random(0, 4);
+        q.stress[0][p] = random(-1, 1);
+        q.stress[1][p] = random(-1, 1);
+        q.stress[2][p] = random(-1, 1);
     }
-    q.x[0] = 0;  // on an edge
-    q.y[0] = 1;
-    const double xa = q.x[5] = 0.1, ya = q.y[5] = 3.9;
+    q.x[0][0] = 0;  // on an edge
+    q.x[1][0] = 1;
+    const double xa = q.x[0][5] = 0.1, ya = q.x[1][5] = 3.9;
     std::vector<double> workspace;
     bodies[0].bins.rebuild<BSplineShape>(q, workspace);
     Gather gather(lattice.nodes());
-    const Bins* bins = &bodies[0].bins;
-    gather.rebuild<3>({&bins, 1}, [&](int i, int j) { return lattice.node(i, j); });
+    const Bins<2>* bins = &bodies[0].bins;
+    gather.rebuild<3, 2>({&bins, 1}, [&](const Index<2>& at) { return lattice.node(at); });
     LatticeEdges edges;
     edges.rebuild(lattice, gather.active());
 
@@ -111,8 +110,8 @@ TEST(MpmShape, BSplineAtTheEdges)
         std::array<double, 4> s{};  // beyond the edges, in all, first moments
         for (std::size_t n = 0; n < lattice.nodes(); ++n)
         {
-            const int i = lattice.node_i(n), j = lattice.node_j(n);
-            if (i < 0 || j < 0 || i > lattice.nx || j > lattice.ny)
+            const int i = lattice.node_index(n)[0], j = lattice.node_index(n)[1];
+            if (i < 0 || j < 0 || i > lattice.size[0] || j > lattice.size[1])
                 s[0] += std::abs(mass[n]);
             EXPECT_GE(mass[n], 0) << i << ' ' << j;
             s[1] += mass[n];
@@ -139,8 +138,8 @@ TEST(MpmShape, BSplineAtTheEdges)
     for (std::size_t p = 0; p < q.count; ++p)
     {
         total += q.mass;
-        mx += q.mass * q.x[p];
-        my += q.mass * q.y[p];
+        mx += q.mass * q.x[0][p];
+        my += q.mass * q.x[1][p];
     }
     EXPECT_EQ(s[0], 0);
     EXPECT_NEAR(s[1], total, 1e-12 * total);
@@ -152,34 +151,35 @@ TEST(MpmShape, BSplineAtTheEdges)
     {
         for (std::size_t n = 0; n < lattice.nodes(); ++n)
         {
-            const Vec2 x = lattice.node_position(n);
+            const Vec<2> x = lattice.node_position(n);
             vx[n] = linear ? 1 + 2 * x[0] - 3 * x[1] : random(-1, 1);
             vy[n] = linear ? -2 + 0.5 * x[0] + x[1] : random(-1, 1);
         }
-        std::vector<double> ux = vx, uy = vy;
+        VectorField<2> u{vx, vy};
         for (std::size_t n = 0; n < lattice.nodes(); ++n)  // must not matter
-            if (lattice.node_i(n) < 0 || lattice.node_j(n) < 0 || lattice.node_i(n) > lattice.nx || lattice.node_j(n) > lattice.ny)
-                ux[n] = uy[n] = 1e3;
-        edges.extend(ux);
-        edges.extend(uy);
+            if (lattice.node_index(n)[0] < 0 || lattice.node_index(n)[1] < 0 || lattice.node_index(n)[0] > lattice.size[0] ||
+                lattice.node_index(n)[1] > lattice.size[1])
+                set(u, n, {1e3, 1e3});
+        for (auto& component : u)
+            edges.extend(component);
         double work = 0, nodal = 0;
         for (std::size_t n = 0; n < lattice.nodes(); ++n)
             nodal += fx[n] * vx[n] + fy[n] * vy[n];
-        for (const Bin& bin : bodies[0].bins.list())
+        for (const Bin<2>& bin : bodies[0].bins.list())
         {
             const BinFrame frame(lattice, bin);
-            const NodalVelocity<3> v(lattice, bin, ux, uy);
+            const NodalVelocity<3> v(lattice, bin, u);
             for (std::size_t p = bin.begin; p < bin.end; ++p)
             {
                 const ShapeAt<BSplineShape> at(frame.corner<BSplineShape>(q, p, AllLanes{}), frame.scale);
-                const Gradient<Pack> d = v.gradient<PointStrain>(at, PointStrain::InBin<BSplineShape>(lattice, q, bin), 1.0);
-                work += q.volume[p] * (q.sxx[p] * d.xx[0] + q.syy[p] * d.yy[0] + q.sxy[p] * (d.xy[0] + d.yx[0]));
+                const Gradient<2, Pack> d = v.gradient<PointStrain>(at, PointStrain::InBin<BSplineShape>(lattice, q, bin), 1.0);
+                work += q.volume[p] * (q.stress[0][p] * d.xx[0] + q.stress[1][p] * d.yy[0] + q.stress[2][p] * (d.xy[0] + d.yx[0]));
                 if (linear)
                 {
                     EXPECT_NEAR(d.xx[0], 2, 1e-11);
                     EXPECT_NEAR(d.xy[0], -3, 1e-11);
                     EXPECT_NEAR(d.yx[0], 0.5, 1e-11);
-                    EXPECT_NEAR(v.at(at)[0][0], 1 + 2 * q.x[p] - 3 * q.y[p], 1e-11);
+                    EXPECT_NEAR(v.at(at)[0][0], 1 + 2 * q.x[0][p] - 3 * q.x[1][p], 1e-11);
                 }
             }
         }
@@ -187,21 +187,21 @@ TEST(MpmShape, BSplineAtTheEdges)
     }
 
     // one point in a corner
-    Points one = q;
+    Points<2> one = q;
     std::size_t k = 0;
-    while (one.x[k] != xa || one.y[k] != ya)
+    while (one.x[0][k] != xa || one.x[1][k] != ya)
         ++k;
     const auto weight = [&](int i, int j)
     {
         std::vector<double> m(lattice.nodes());
-        const BinFrame frame(lattice, Bin{-1, 7, 0, 1});
-        const Corner c = frame.corner<BSplineShape>(one, k, AllLanes{});
-        const auto wx = BSplineShape::weights(c.ax, c.wx), wy = BSplineShape::weights(c.ay, c.wy);
+        const BinFrame frame(lattice, Bin<2>{{-1, 7}, 0, 1});
+        const Corner<2> c = frame.corner<BSplineShape>(one, k, AllLanes{});
+        const auto wx = BSplineShape::weights(c.a[0], c.width[0]), wy = BSplineShape::weights(c.a[1], c.width[1]);
         for (int b = 0; b < 3; ++b)
             for (int a = 0; a < 3; ++a)
-                m[lattice.node(-1 + a, 7 + b)] = wx[a][0] * wy[b][0];
+                m[lattice.node({-1 + a, 7 + b})] = wx[a][0] * wy[b][0];
         edges.fold(m);
-        return m[lattice.node(i, j)];
+        return m[lattice.node({i, j})];
     };
     EXPECT_NEAR(weight(0, 8), 0.8 * 0.8, 1e-14);
     EXPECT_NEAR(weight(1, 8), 0.2 * 0.8, 1e-14);
@@ -273,9 +273,9 @@ TEST(Mpm, SameBitsForAnyThreads)
             solver->prepare(0, 5e-3);
             solver->advance(5e-3);
         }
-        const Points& q = solver->bodies()[0].points;
-        std::vector<double> out(q.sxx.data(), q.sxx.data() + q.count);
-        out.insert(out.end(), q.vx.data(), q.vx.data() + q.count);
+        const Points<2>& q = solver->bodies()[0].points;
+        std::vector<double> out(q.stress[0].data(), q.stress[0].data() + q.count);
+        out.insert(out.end(), q.v[0].data(), q.v[0].data() + q.count);
         set_threads(1);
         return out;
     };

@@ -9,13 +9,13 @@ using namespace testbed;
 
 namespace
 {
-Nodes two_nodes()
+Nodes<2> two_nodes()
 {
-    Nodes nodes(3);
+    Nodes<2> nodes(3);
     nodes.set_active({0, 2});
     nodes.mass = {2, 5, 4};
-    nodes.vx = {1, 7, -1};
-    nodes.fx = {10, 11, 12};
+    nodes.v[0] = {1, 7, -1};
+    nodes.f[0] = {10, 11, 12};
     return nodes;
 }
 }  // namespace
@@ -27,10 +27,10 @@ TEST(Gravity, RampsSmoothly)
     EXPECT_NEAR(gravity.factor(1), 0.5, 1e-12);
     EXPECT_DOUBLE_EQ(gravity.factor(2), 1);
     EXPECT_DOUBLE_EQ((Gravity{{0, -9.81}, 0}.factor(0)), 1);  // at once
-    Nodes nodes = two_nodes();
+    Nodes<2> nodes = two_nodes();
     gravity.apply(nodes, 5);
-    EXPECT_DOUBLE_EQ(nodes.fy[0], -2 * 9.81);
-    EXPECT_DOUBLE_EQ(nodes.fy[1], 0);  // not in use
+    EXPECT_DOUBLE_EQ(nodes.f[1][0], -2 * 9.81);
+    EXPECT_DOUBLE_EQ(nodes.f[1][1], 0);  // not in use
 }
 
 /// Loading to failure: in proportion to time.
@@ -47,10 +47,10 @@ TEST(Gravity, RampsLinearlyWhereTheSceneSaysSo)
 /// Each component by its own acceleration.
 TEST(Gravity, PullsBothWays)
 {
-    Nodes nodes = two_nodes();
+    Nodes<2> nodes = two_nodes();
     (Gravity{{2, -3}, 0}).apply(nodes, 1);
-    EXPECT_DOUBLE_EQ(nodes.fx[2], 12 + 4 * 2);
-    EXPECT_DOUBLE_EQ(nodes.fy[2], -4 * 3);
+    EXPECT_DOUBLE_EQ(nodes.f[0][2], 12 + 4 * 2);
+    EXPECT_DOUBLE_EQ(nodes.f[1][2], -4 * 3);
 }
 
 /// Eq. (15): opposes the motion, whatever the sign of the force; nothing at rest.
@@ -77,40 +77,40 @@ TEST(LocalDamping, KnowsWhatItTook)
 
 TEST(Accelerate, ByForceOverMass)
 {
-    Nodes nodes = two_nodes();
+    Nodes<2> nodes = two_nodes();
     nodes.mass[2] = 0;
     accelerate(nodes, nodes.mass, 0.1);
-    EXPECT_DOUBLE_EQ(nodes.vx[0], 1.5);
-    EXPECT_DOUBLE_EQ(nodes.vx[1], 7);
-    EXPECT_DOUBLE_EQ(nodes.vx[2], -1);  // no mass, no acceleration
+    EXPECT_DOUBLE_EQ(nodes.v[0][0], 1.5);
+    EXPECT_DOUBLE_EQ(nodes.v[0][1], 7);
+    EXPECT_DOUBLE_EQ(nodes.v[0][2], -1);  // no mass, no acceleration
 }
 
 /// The work of a kick is the change of the kinetic energy; mass times way and what damping took go with the velocity in its middle.
 TEST(Accelerate, KnowsItsWork)
 {
-    Nodes nodes = two_nodes();
-    nodes.fy = {4, 0, -6};
-    nodes.vy = {-3, 0, 2};
+    Nodes<2> nodes = two_nodes();
+    nodes.f[1] = {4, 0, -6};
+    nodes.v[1] = {-3, 0, 2};
     const auto kinetic = [&]
     {
         double sum = 0;
         for (const std::size_t n : {0, 2})
-            sum += 0.5 * nodes.mass[n] * (nodes.vx[n] * nodes.vx[n] + nodes.vy[n] * nodes.vy[n]);
+            sum += 0.5 * nodes.mass[n] * (nodes.v[0][n] * nodes.v[0][n] + nodes.v[1][n] * nodes.v[1][n]);
         return sum;
     };
     const LocalDamping damping{0.5};
-    const Nodes before = nodes;
+    const Nodes<2> before = nodes;
     const double energy = kinetic();
     const Kick kick = accelerate(nodes, nodes.mass, 0.1, damping);
     EXPECT_NEAR(kick.work, kinetic() - energy, 1e-12);
-    Vec2 transport{0, 0};
+    Vec<2> transport{0, 0};
     double damped = 0;
     for (const std::size_t n : {0, 2})
     {
-        const double x = 0.5 * (before.vx[n] + nodes.vx[n]), y = 0.5 * (before.vy[n] + nodes.vy[n]);
+        const double x = 0.5 * (before.v[0][n] + nodes.v[0][n]), y = 0.5 * (before.v[1][n] + nodes.v[1][n]);
         transport = {transport[0] + 0.1 * nodes.mass[n] * x, transport[1] + 0.1 * nodes.mass[n] * y};
-        damped += 0.1 * (damping.taken(Pack(before.fx[n]), Pack(before.vx[n]))[0] * x +
-                         damping.taken(Pack(before.fy[n]), Pack(before.vy[n]))[0] * y);
+        damped += 0.1 * (damping.taken(Pack(before.f[0][n]), Pack(before.v[0][n]))[0] * x +
+                         damping.taken(Pack(before.f[1][n]), Pack(before.v[1][n]))[0] * y);
     }
     EXPECT_NEAR(kick.transport[0], transport[0], 1e-12);
     EXPECT_NEAR(kick.transport[1], transport[1], 1e-12);
@@ -119,8 +119,8 @@ TEST(Accelerate, KnowsItsWork)
 
 TEST(NodalSums, EnergyAndMomenta)
 {
-    Nodes nodes = two_nodes();
-    const Lattice lattice{{0, 0}, 1.0, 1, 1};
+    Nodes<2> nodes = two_nodes();
+    const Lattice<2> lattice{{0, 0}, 1.0, {1, 1}};
     const MotionSums s = nodal_sums(lattice, nodes, 0.2, 5.0);
     // v at the time of the force: 1 + 10/2*0.2 = 2, -1 + 12/4*0.2 = -0.4; half a step later: 3, 0.2
     EXPECT_NEAR(s.kinetic_energy, 0.5 * 2 * (1 * 3) + 0.5 * 4 * (-1 * 0.2), 1e-12);
@@ -147,25 +147,25 @@ name = "left"
 where = "x <= -1"
 fix = "x"
 )");
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     NodeOps ops(scene, lattice);
     EXPECT_EQ(ops.restraints().size(), 2u);
-    std::vector<double> vx(lattice.nodes(), 1), vy(lattice.nodes(), 1);
-    Nodes nodes(lattice.nodes());
+    VectorField<2> v{std::vector<double>(lattice.nodes(), 1), std::vector<double>(lattice.nodes(), 1)};
+    Nodes<2> nodes(lattice.nodes());
     std::vector<std::uint32_t> all(lattice.nodes() - 1);  // but the last one
     std::iota(all.begin(), all.end(), 0u);
     nodes.set_active(all);
-    ops.restrain(lattice, nodes, vx, vy);
-    EXPECT_EQ(vy[lattice.node(3, 0)], 0);
-    EXPECT_EQ(vx[lattice.node(0, 3)], 0);
-    EXPECT_EQ(vy[lattice.node(0, 3)], 1);
-    EXPECT_EQ(vx[lattice.node(3, 3)], 1);
-    for (const auto& [i, j] : {std::pair{-1, 3}, {0, -1}, {0, lattice.ny + 1}})  // the ring around the lattice, too
-        EXPECT_EQ(vx[lattice.node(i, j)], 0) << i << ' ' << j;
+    ops.restrain(lattice, nodes, v);
+    EXPECT_EQ(v[1][lattice.node({3, 0})], 0);
+    EXPECT_EQ(v[0][lattice.node({0, 3})], 0);
+    EXPECT_EQ(v[1][lattice.node({0, 3})], 1);
+    EXPECT_EQ(v[0][lattice.node({3, 3})], 1);
+    for (const auto& [i, j] : {std::pair{-1, 3}, {0, -1}, {0, lattice.size[1] + 1}})  // the ring around the lattice, too
+        EXPECT_EQ(v[0][lattice.node({i, j})], 0) << i << ' ' << j;
     nodes.set_active({});
-    std::fill(vy.begin(), vy.end(), 1.0);
-    ops.restrain(lattice, nodes, vx, vy);
-    EXPECT_EQ(vy[lattice.node(3, 0)], 1);  // a node that is not in use costs nothing
+    std::fill(v[1].begin(), v[1].end(), 1.0);
+    ops.restrain(lattice, nodes, v);
+    EXPECT_EQ(v[1][lattice.node({3, 0})], 1);  // a node that is not in use costs nothing
 }
 
 TEST(NodeOps, WhatASceneDoesNotHaveIsAbsent)

@@ -23,19 +23,19 @@ template <class Support>
 void check_against_double_sum(const std::string& weight, double tolerance)
 {
     const Scene scene = nonlocal_scene(0.4, 1.7, weight);
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     auto bodies = make_bodies(scene, lattice, {.box = Support::has_box});
     std::vector<double> workspace;
     bodies[0].bins.template rebuild<Support>(bodies[0].points, workspace);
     constexpr bool cells = std::is_same_v<Support, PointSupport> || std::is_same_v<Support, DomainSupport>;
-    const auto index = [&](int i, int j) { return cells ? lattice.cell(i, j) : lattice.node(i, j); };
+    const auto index = [&](const Index<2>& at) { return cells ? lattice.cell(at) : lattice.node(at); };
     Gather gather(cells ? lattice.cells() : lattice.nodes());
-    const std::vector<const Bins*> bins{&bodies[0].bins};
-    gather.rebuild<Support::S>(bins, index);
-    Points& q = bodies[0].points;
+    const std::vector<const Bins<2>*> bins{&bodies[0].bins};
+    gather.rebuild<Support::S, 2>(bins, index);
+    Points<2>& q = bodies[0].points;
     const auto strain = [](double x, double y) { return 0.02 * (1 + std::sin(1.1 * x) * std::cos(0.8 * y)); };
     for (std::size_t p = 0; p < q.count; ++p)
-        q.plastic_shear[p] = strain(q.x[p], q.y[p]);
+        q.plastic_shear[p] = strain(q.x[0][p], q.x[1][p]);
     NonlocalStrain nonlocal(scene, lattice.cell_size);
     nonlocal.resize(cells ? lattice.cell_stride() : lattice.node_stride(), cells ? lattice.cells() : lattice.nodes());
     nonlocal.apply<Support>(lattice, bodies, gather, index);
@@ -45,7 +45,7 @@ void check_against_double_sum(const std::string& weight, double tolerance)
         double sum = 0, total = 0;
         for (std::size_t o = 0; o < q.count; ++o)
         {
-            const double w = nonlocal_weight(spec, std::hypot(q.x[p] - q.x[o], q.y[p] - q.y[o]));
+            const double w = nonlocal_weight(spec, std::hypot(q.x[0][p] - q.x[0][o], q.x[1][p] - q.x[1][o]));
             sum += w * q.plastic_shear[o];
             total += w;
         }
@@ -71,23 +71,23 @@ TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
 {
     const Scene scene = nonlocal_scene(0.4, 1.7, "gauss");
     EXPECT_TRUE(has_nonlocal_softening(scene));
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     auto bodies = make_bodies(scene, lattice, {});
     std::vector<double> workspace;
     bodies[0].bins.rebuild<PointSupport>(bodies[0].points, workspace);
-    const auto index = [&](int i, int j) { return lattice.cell(i, j); };
+    const auto index = [&](const Index<2>& at) { return lattice.cell(at); };
     Gather gather(lattice.cells());
-    const std::vector<const Bins*> bins{&bodies[0].bins};
-    gather.rebuild<1>(bins, index);
+    const std::vector<const Bins<2>*> bins{&bodies[0].bins};
+    gather.rebuild<1, 2>(bins, index);
     bodies[0].points.plastic_shear[700] = 0.01;  // one point: its own strain counts -0.7, the mean next to nothing
     NonlocalStrain nonlocal(scene, lattice.cell_size);
     nonlocal.resize(lattice.cell_stride(), lattice.cells());
     nonlocal.apply<PointSupport>(lattice, bodies, gather, index);
     EXPECT_EQ(bodies[0].points.softening_strain[700], 0);
     EXPECT_GT(bodies[0].points.softening_strain[704], 0);
-    const Points& q = bodies[0].points;
+    const Points<2>& q = bodies[0].points;
     for (std::size_t p = 0; p < q.count; ++p)  // the weight reaches three internal lengths
-        if (const double r = std::hypot(q.x[p] - q.x[700], q.y[p] - q.y[700]); r > 0.3)
+        if (const double r = std::hypot(q.x[0][p] - q.x[0][700], q.x[1][p] - q.x[1][700]); r > 0.3)
             EXPECT_TRUE(r > 1.1 || q.softening_strain[p] > 0) << r;
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::gauss}, 2), std::exp(-1.0));
     EXPECT_EQ(nonlocal_weight({.internal_length = 2, .over_nonlocal = 2, .weight = NonlocalSpec::Weight::gauss}, 1), std::exp(-0.25));

@@ -9,7 +9,7 @@
 namespace testbed
 {
 /// Area of a polygon whose corners run anticlockwise [m^2].
-inline double polygon_area(std::span<const Vec2> x)
+inline double polygon_area(std::span<const Vec<2>> x)
 {
     double twice = 0;
     for (std::size_t k = 0, n = x.size(); k < n; ++k)
@@ -19,13 +19,13 @@ inline double polygon_area(std::span<const Vec2> x)
 
 /// Mean gradient of a field that varies linearly along each side, from its nodal values: eq. (4b) in the form that
 /// follows from (4a), <du/dx> = 1/(2A) sum u[k] (y[k+1] - y[k-1]), <du/dy> = 1/(2A) sum u[k] (x[k-1] - x[k+1]).
-inline Gradient<> polygon_gradient(std::span<const Vec2> x, std::span<const Vec2> u)
+inline Gradient<2> polygon_gradient(std::span<const Vec<2>> x, std::span<const Vec<2>> u)
 {
-    Gradient<> g;
+    Gradient<2> g;
     const std::size_t n = x.size();
     for (std::size_t k = 0; k < n; ++k)
     {
-        const Vec2 &next = x[(k + 1) % n], &last = x[(k + n - 1) % n];
+        const Vec<2>&next = x[(k + 1) % n], &last = x[(k + n - 1) % n];
         g.xx += u[k][0] * (next[1] - last[1]);
         g.yy += u[k][1] * (last[0] - next[0]);
         g.xy += u[k][0] * (last[0] - next[0]);
@@ -37,13 +37,13 @@ inline Gradient<> polygon_gradient(std::span<const Vec2> x, std::span<const Vec2
 
 /// Forces at the corners of a polygon that carries the mean stress s: eq. (9) with the signs that virtual work asks for,
 /// sum F[k] . u[k] = -A s : <grad u> for every u. [N/m]
-inline std::vector<Vec2> polygon_forces(std::span<const Vec2> x, const SymTensor<>& s)
+inline std::vector<Vec<2>> polygon_forces(std::span<const Vec<2>> x, const SymTensor<2>& s)
 {
     const std::size_t n = x.size();
-    std::vector<Vec2> force(n);
+    std::vector<Vec<2>> force(n);
     for (std::size_t k = 0; k < n; ++k)
     {
-        const Vec2 &next = x[(k + 1) % n], &last = x[(k + n - 1) % n];
+        const Vec<2>&next = x[(k + 1) % n], &last = x[(k + n - 1) % n];
         const double dy = next[1] - last[1], dx = last[0] - next[0];
         force[k] = {-0.5 * (s.xx * dy + s.xy * dx), -0.5 * (s.xy * dy + s.yy * dx)};
     }

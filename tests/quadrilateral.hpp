@@ -21,7 +21,7 @@ struct IntegrationPoint
 /// Two overlays of two constant-strain triangles, each with half of its area (Marti & Cundall 1982).
 inline std::vector<IntegrationPoint> triangles()
 {
-    constexpr std::array<Vec2, 4> node{{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
+    constexpr std::array<Vec<2>, 4> node{{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
     std::vector<IntegrationPoint> points;
     for (const auto& t : std::array<std::array<std::size_t, 3>, 4>{{{0, 1, 2}, {0, 2, 3}, {0, 1, 3}, {1, 2, 3}}})
     {
@@ -29,7 +29,7 @@ inline std::vector<IntegrationPoint> triangles()
         point.area = 0.25;
         for (std::size_t k = 0; k < 3; ++k)
         {
-            const Vec2 &b = node[t[(k + 1) % 3]], &c = node[t[(k + 2) % 3]];
+            const Vec<2>&b = node[t[(k + 1) % 3]], &c = node[t[(k + 2) % 3]];
             point.dx[t[k]] = b[1] - c[1];  // over twice the area, 1
             point.dy[t[k]] = c[0] - b[0];
         }
@@ -45,10 +45,10 @@ double pressure_on_top(const Law& law, const std::vector<IntegrationPoint>& poin
     using State = typename Law::template State<double>;
     std::vector<State> before(points.size()), now;
     const double stiffness = law.moduli.constrained();
-    std::array<Vec2, 4> force{};
+    std::array<Vec<2>, 4> force{};
     for (int step = 0; step < steps; ++step)
     {
-        std::array<Vec2, 4> u{{{0, 0}, {0, 0}, {0, -strain / steps}, {0, -strain / steps}}};
+        std::array<Vec<2>, 4> u{{{0, 0}, {0, 0}, {0, -strain / steps}, {0, -strain / steps}}};
         for (int round = 0; round < 200; ++round)
         {
             now = before;
@@ -56,11 +56,11 @@ double pressure_on_top(const Law& law, const std::vector<IntegrationPoint>& poin
             for (std::size_t k = 0; k < points.size(); ++k)
             {
                 const IntegrationPoint& at = points[k];
-                Gradient<double> d{};
+                Gradient<2> d{};
                 for (std::size_t n = 0; n < 4; ++n)
-                    d = d + Gradient<double>{at.dx[n] * u[n][0], at.dy[n] * u[n][1], at.dy[n] * u[n][0], at.dx[n] * u[n][1]};
+                    d = d + Gradient<2>{at.dx[n] * u[n][0], at.dy[n] * u[n][1], at.dy[n] * u[n][0], at.dx[n] * u[n][1]};
                 law.update(now[k], d);
-                const SymTensor<>& s = now[k].stress;
+                const SymTensor<2>& s = now[k].stress;
                 for (std::size_t n = 0; n < 4; ++n)
                     force[n] = {force[n][0] + at.area * (s.xx * at.dx[n] + s.xy * at.dy[n]),
                                 force[n][1] + at.area * (s.xy * at.dx[n] + s.yy * at.dy[n])};

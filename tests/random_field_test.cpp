@@ -68,7 +68,7 @@ TEST(RandomStrength, MeanDeviationAndTruncation)
 {
     const Scene scene = test::load(with(random_table), "", {"body.soil.points_per_cell=16", "material.soil.random.cohesion_deviation=0.8"});
     const auto bodies = make_bodies(scene, make_lattice(scene.grid), {});
-    const Points& q = bodies[0].points;
+    const Points<2>& q = bodies[0].points;
     double c = 0, phi = 0, square = 0, zero = 0, together = 0;
     for (std::size_t p = 0; p < q.count; ++p)
     {
@@ -91,18 +91,18 @@ TEST(RandomStrength, MeanDeviationAndTruncation)
 TEST(RandomStrength, CorrelatedFieldIsTheSameForEveryCellSize)
 {
     const std::string text = with(random_table + "field = \"correlated\"\ncorrelation_length = 0.8\n");
-    const auto at = [&](const std::vector<std::string>& set, const Vec2& place)
+    const auto at = [&](const std::vector<std::string>& set, const Vec<2>& place)
     {
         const Scene scene = test::load(text, "", set);
         const auto bodies = make_bodies(scene, make_lattice(scene.grid), {});
-        const Points& q = bodies[0].points;
+        const Points<2>& q = bodies[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            if (std::hypot(q.x[p] - place[0], q.y[p] - place[1]) < 1e-9)
+            if (std::hypot(q.x[0][p] - place[0], q.x[1][p] - place[1]) < 1e-9)
                 return q.cohesion[p];
         ADD_FAILURE() << "no point there";
         return 0.0;
     };
-    const Vec2 place{1.75, 1.25};
+    const Vec<2> place{1.75, 1.25};
     EXPECT_DOUBLE_EQ(at({"body.soil.points_per_cell=1"}, place),
                      at({"grid.cell_size=0.25", "body.soil.points_per_cell=5", "grid.origin=[-0.125, -0.125]", "grid.size=[5.0, 5.0]",
                          "body.soil.min=[0.125,0.125]", "body.soil.max=[3.125,2.125]"},
@@ -118,8 +118,8 @@ TEST(Strength, ExpressionsAndTheirLimits)
     };
     EXPECT_FALSE(bodies_of({})[0].points.cohesion.active());  // one strength needs no field
     const auto bodies = bodies_of({"material.soil.strength.cohesion='1000 + 500*Y'"});
-    const Points& q = bodies[0].points;
-    EXPECT_DOUBLE_EQ(q.cohesion[10], 1000 + 500 * q.y[10]);
+    const Points<2>& q = bodies[0].points;
+    EXPECT_DOUBLE_EQ(q.cohesion[10], 1000 + 500 * q.x[1][10]);
     EXPECT_THROW(bodies_of({"material.soil.strength.cohesion='1000 - 500*Y'"}), SceneError);
     EXPECT_THROW(bodies_of({"material.soil.strength.friction_angle='0.5 + Y'"}), SceneError);
 }
@@ -171,11 +171,11 @@ TEST(Inclusion, LeavesTheRandomSoilAroundItAsItIs)
         "[[body]]\nname = \"grain\"\nmaterial = \"soil\"\nshape = \"disk\"\ninside = \"soil\"\ncenter = [2.0, 1.5]\nradius = 0.7\n";
     const Scene whole = test::load(with(random_table)), scene = test::load(with(random_table) + grain);
     const auto all = make_bodies(whole, make_lattice(whole.grid), {}), part = make_bodies(scene, make_lattice(scene.grid), {});
-    const Points &a = all[0].points, &b = part[0].points;
+    const Points<2>&a = all[0].points, &b = part[0].points;
     std::size_t p = 0;
     for (std::size_t n = 0; n < b.count; ++n)
     {
-        while (a.x[p] != b.x[n] || a.y[p] != b.y[n])
+        while (a.x[0][p] != b.x[0][n] || a.x[1][p] != b.x[1][n])
             ++p;
         EXPECT_EQ(a.cohesion[p], b.cohesion[n]);
     }
@@ -185,9 +185,9 @@ TEST(InitialStress, IsThatOfTheScene)
 {
     const Scene scene = test::load(soil + "initial_stress = [\"0.5*1e4*(Y-3)\", \"1e4*(Y-3)\", \"0.4*1e4*(Y-3)\", \"7\"]\n");
     const auto bodies = make_bodies(scene, make_lattice(scene.grid), {});
-    const Points& q = bodies[0].points;
-    EXPECT_DOUBLE_EQ(q.sxx[9], 0.5e4 * (q.y[9] - 3));
-    EXPECT_DOUBLE_EQ(q.syy[9], 1e4 * (q.y[9] - 3));
-    EXPECT_DOUBLE_EQ(q.szz[9], 0.4e4 * (q.y[9] - 3));
-    EXPECT_DOUBLE_EQ(q.sxy[9], 7);
+    const Points<2>& q = bodies[0].points;
+    EXPECT_DOUBLE_EQ(q.stress[0][9], 0.5e4 * (q.x[1][9] - 3));
+    EXPECT_DOUBLE_EQ(q.stress[1][9], 1e4 * (q.x[1][9] - 3));
+    EXPECT_DOUBLE_EQ(q.szz[9], 0.4e4 * (q.x[1][9] - 3));
+    EXPECT_DOUBLE_EQ(q.stress[2][9], 7);
 }

@@ -18,7 +18,7 @@ struct RefPoint
     double x, y, m, V, hx, hy, vx = 0, vy = 0;
     double E, nu;
     int rotation;  ///< 1 Jaumann, 2 exact
-    SymTensor<> s{};
+    SymTensor<2> s{};
 };
 
 struct RefGrid
@@ -28,12 +28,12 @@ struct RefGrid
 
 using Key = std::pair<int, int>;
 
-inline void ref_stress(RefPoint& p, const Gradient<>& d)
+inline void ref_stress(RefPoint& p, const Gradient<2>& d)
 {
     const double w = d.rotation();
     if (p.rotation == 1)
     {
-        const SymTensor<> s = p.s;
+        const SymTensor<2> s = p.s;
         p.s.xx += -2 * w * s.xy;
         p.s.yy += 2 * w * s.xy;
         p.s.xy += w * (s.xx - s.yy);
@@ -41,7 +41,7 @@ inline void ref_stress(RefPoint& p, const Gradient<>& d)
     else
     {
         const double c = std::cos(w), n = std::sin(w);
-        const SymTensor<> s = p.s;
+        const SymTensor<2> s = p.s;
         p.s = {c * c * s.xx + n * n * s.yy - 2 * c * n * s.xy, n * n * s.xx + c * c * s.yy + 2 * c * n * s.xy,
                c * n * (s.xx - s.yy) + (c * c - n * n) * s.xy};
     }
@@ -58,7 +58,7 @@ inline double ref_inverse(double e)
 }
 
 /// Gradient of the displacement over the middle of the step, G (I + G/2)^-1, from the one over its start.
-inline Gradient<> ref_midpoint(const Gradient<>& g)
+inline Gradient<2> ref_midpoint(const Gradient<2>& g)
 {
     const double a = 1 + g.xx / 2, b = g.xy / 2, c = g.yx / 2, d = 1 + g.yy / 2, inverse = ref_inverse(a * d - b * c - 1);
     return {(g.xx * d - g.xy * c) * inverse, (g.yy * a - g.yx * b) * inverse, (g.xy * a - g.xx * b) * inverse,
@@ -72,9 +72,9 @@ inline double ref_ratio(double d)
 }
 
 /// v of (I + G) v = u, by repetition.
-inline Vec2 ref_departed(const Vec2& u, const Gradient<>& g)
+inline Vec<2> ref_departed(const Vec<2>& u, const Gradient<2>& g)
 {
-    Vec2 v = u;
+    Vec<2> v = u;
     for (int sweep = 0; sweep < 60; ++sweep)
         v = {u[0] - v[0] * g.xx - v[1] * g.xy, u[1] - v[0] * g.yx - v[1] * g.yy};
     return v;
@@ -88,8 +88,8 @@ struct RefLpfdm
     bool domain, central;
     bool two_sided = false, arrival = false;
     double hourglass_rate = 0;
-    std::map<Key, Vec2> v{};      ///< velocity of the nodes that had mass in the step before
-    std::map<Key, Vec2> ahead{};  ///< of nodes without mass that belong to a point's 2 x 2 cells
+    std::map<Key, Vec<2>> v{};      ///< velocity of the nodes that had mass in the step before
+    std::map<Key, Vec<2>> ahead{};  ///< of nodes without mass that belong to a point's 2 x 2 cells
     std::map<Key, double> old_mass{};
     std::set<Key> faces{};
     double sliver_mass = 0;  ///< below which a node counts as a sliver
@@ -99,8 +99,8 @@ struct RefLpfdm
     struct Cell
     {
         double M = 0;
-        SymTensor<> s{};
-        Gradient<> g{};
+        SymTensor<2> s{};
+        Gradient<2> g{};
     };
 
     /// Cells of a point with their weights.
@@ -126,7 +126,7 @@ struct RefLpfdm
         for (auto& [k, c] : cells)
         {
             const auto [i, j] = k;
-            const Vec2 a = v[{i, j}], b = v[{i + 1, j}], d = v[{i, j + 1}], e = v[{i + 1, j + 1}];
+            const Vec<2> a = v[{i, j}], b = v[{i + 1, j}], d = v[{i, j + 1}], e = v[{i + 1, j + 1}];
             const double f = dt / (2 * grid.L);
             c.g = {(b[0] + e[0] - a[0] - d[0]) * f, (d[1] + e[1] - a[1] - b[1]) * f, (d[0] + e[0] - a[0] - b[0]) * f,
                    (b[1] + e[1] - a[1] - d[1]) * f};
@@ -156,8 +156,8 @@ struct RefLpfdm
     {
         const double h = dt / 2, L = grid.L;
         gradients(cells, dt);
-        const std::map<Key, Vec2> u = v;
-        std::map<Key, Gradient<>> rate;  // velocity gradient at nodes: mean of the cells, at half of the way that is gone in dt/2
+        const std::map<Key, Vec<2>> u = v;
+        std::map<Key, Gradient<2>> rate;  // velocity gradient at nodes: mean of the cells, at half of the way that is gone in dt/2
         for (const auto& [k, mass] : m)
         {
             double total = 0;
@@ -175,17 +175,17 @@ struct RefLpfdm
             rate[k] = (1 / total) * rate[k];
         }
         // what the neighbours say of a node: mean velocity, and what their gradients add on the way to it
-        const auto neighbours = [&](const Key& k, const std::map<Key, Vec2>& velocity, bool with_mass_before)
+        const auto neighbours = [&](const Key& k, const std::map<Key, Vec<2>>& velocity, bool with_mass_before)
         {
             double total = 0;
-            Vec2 mean{0, 0}, beyond{0, 0};
+            Vec<2> mean{0, 0}, beyond{0, 0};
             for (const auto& [other, mass] : m)
             {
                 const int di = k.first - other.first, dj = k.second - other.second;
                 if (other == k || std::abs(di) > 1 || std::abs(dj) > 1 || (with_mass_before && !old_mass.count(other)))
                     continue;
                 const double w = with_mass_before ? std::min(mass, old_mass.at(other)) : mass;
-                const Gradient<>& g = rate.at(other);
+                const Gradient<2>& g = rate.at(other);
                 total += w;
                 for (int d = 0; d < 2; ++d)
                     mean[d] += w * velocity.at(other)[d];
@@ -203,11 +203,11 @@ struct RefLpfdm
         for (const auto& [k, mass] : m)
         {
             const auto [i, j] = k;
-            Vec2 w = u.at(k);
-            Gradient<> g = h * rate.at(k);
+            Vec<2> w = u.at(k);
+            Gradient<2> g = h * rate.at(k);
             if (faces.count(k))
             {
-                const Vec2 moves = w;
+                const Vec<2> moves = w;
                 const double before = old_mass.count(k) ? old_mass.at(k) : 0;
                 const double share = std::max({0.0, mass_arrives ? 1 - before / mass : 0.0, 1 - mass / sliver_mass});
                 if (share > 0)
@@ -222,7 +222,7 @@ struct RefLpfdm
                 const auto pair = [&](const Key& a, const Key& b)
                 {
                     double M = 0;
-                    Gradient<> mean{};
+                    Gradient<2> mean{};
                     for (const Key& c : {a, b})
                         if (cells.count(c))
                         {
@@ -236,24 +236,24 @@ struct RefLpfdm
                 const double down = mass_of(cells, i - 1, j - 1) + mass_of(cells, i, j - 1),
                              up = mass_of(cells, i - 1, j) + mass_of(cells, i, j);
                 // where the face leads, the part of its own derivative that damps
-                const auto across = [&](const Vec2& own, const Vec2& strain, const Vec2& next, bool leads)
+                const auto across = [&](const Vec<2>& own, const Vec<2>& strain, const Vec<2>& next, bool leads)
                 {
-                    const Vec2 apart{own[0] - next[0], own[1] - next[1]};
+                    const Vec<2> apart{own[0] - next[0], own[1] - next[1]};
                     const double square = apart[0] * apart[0] + apart[1] * apart[1];
                     if (!leads || square == 0)
                         return next;
                     const double along = 2 * (strain[0] * apart[0] + strain[1] * apart[1]) / square;
                     const double own_part = (1 - std::max(0.0, share)) * std::min(1.0, std::max(0.0, along));
-                    return Vec2{next[0] + own_part * apart[0], next[1] + own_part * apart[1]};
+                    return Vec<2>{next[0] + own_part * apart[0], next[1] + own_part * apart[1]};
                 };
-                const Gradient<> own = g;
+                const Gradient<2> own = g;
                 if (const double part = missing(left, right); part > 0)
                 {
                     const int next = right > left ? i + 1 : i - 2;
                     const auto [M, inner] = pair({next, j - 1}, {next, j});
                     const double take = h * std::min(1.0, M / std::max(left, right));
-                    const Vec2 d = across({own.xx, own.yx}, {own.xx, (own.xy + own.yx) / 2}, {take * inner.xx, take * inner.yx},
-                                          (left - right) * moves[0] > 0);
+                    const Vec<2> d = across({own.xx, own.yx}, {own.xx, (own.xy + own.yx) / 2}, {take * inner.xx, take * inner.yx},
+                                            (left - right) * moves[0] > 0);
                     g.xx = (1 - part) * own.xx + part * d[0];
                     g.yx = (1 - part) * own.yx + part * d[1];
                 }
@@ -262,8 +262,8 @@ struct RefLpfdm
                     const int next = up > down ? j + 1 : j - 2;
                     const auto [M, inner] = pair({i - 1, next}, {i, next});
                     const double take = h * std::min(1.0, M / std::max(down, up));
-                    const Vec2 d = across({own.xy, own.yy}, {(own.xy + own.yx) / 2, own.yy}, {take * inner.xy, take * inner.yy},
-                                          (down - up) * moves[1] > 0);
+                    const Vec<2> d = across({own.xy, own.yy}, {(own.xy + own.yx) / 2, own.yy}, {take * inner.xy, take * inner.yy},
+                                            (down - up) * moves[1] > 0);
                     g.xy = (1 - part) * own.xy + part * d[0];
                     g.yy = (1 - part) * own.yy + part * d[1];
                 }
@@ -289,12 +289,12 @@ struct RefLpfdm
         return {static_cast<int>(std::floor((p.x - grid.ox) / grid.L - std::min(p.hx / grid.L, 0.5) + 1e-9)),
                 static_cast<int>(std::floor((p.y - grid.oy) / grid.L - std::min(p.hy / grid.L, 0.5) + 1e-9))};
     }
-    Vec2 velocity_of(const Key& k) const
+    Vec<2> velocity_of(const Key& k) const
     {
         if (const auto found = v.find(k); found != v.end())
             return found->second;
         const auto found = ahead.find(k);
-        return found == ahead.end() ? Vec2{0, 0} : found->second;
+        return found == ahead.end() ? Vec<2>{0, 0} : found->second;
     }
     /// Moves and strains a box with the velocity that it meets in the middle of the step. It gets there with the mean gradient of its 2 x 2
     /// cells about their middle node.
@@ -302,31 +302,31 @@ struct RefLpfdm
     {
         const double L = grid.L, hx = std::min(p.hx / L, 0.5), hy = std::min(p.hy / L, 0.5);
         const Key bin = bin_of(p);
-        Gradient<> cell[2][2], mean{};
+        Gradient<2> cell[2][2], mean{};
         for (int j = 0; j < 2; ++j)
             for (int i = 0; i < 2; ++i)
             {
                 const auto at = [&](int a, int b) { return velocity_of({bin.first + i + a, bin.second + j + b}); };
-                const Vec2 a = at(0, 0), b = at(1, 0), c = at(0, 1), d = at(1, 1);
+                const Vec<2> a = at(0, 0), b = at(1, 0), c = at(0, 1), d = at(1, 1);
                 const double f = dt / (2 * L);
                 cell[j][i] = {f * (b[0] + d[0] - a[0] - c[0]), f * (c[1] + d[1] - a[1] - b[1]), f * (c[0] + d[0] - a[0] - b[0]),
                               f * (b[1] + d[1] - a[1] - c[1])};
                 mean = mean + 0.25 * cell[j][i];
             }
-        const Vec2 u = velocity_of({bin.first + 1, bin.second + 1});
+        const Vec<2> u = velocity_of({bin.first + 1, bin.second + 1});
         const double x = (p.x - grid.ox) / L - bin.first - 1, y = (p.y - grid.oy) / L - bin.second - 1;  // from the middle node
         // how far beyond the lattice lines it is then, in lengths of the start
         const double bx = x + (mean.xy * y + u[0] * dt / L) / 2 * ref_inverse(mean.xx / 2);
         const double by = y + (mean.yx * x + u[1] * dt / L) / 2 * ref_inverse(mean.yy / 2);
         const double a = std::clamp((bx + hx) / (2 * hx), 0.0, 1.0), b = std::clamp((by + hy) / (2 * hy), 0.0, 1.0);
-        const Gradient<> g = (1 - a) * (1 - b) * cell[0][0] + a * (1 - b) * cell[0][1] + (1 - a) * b * cell[1][0] + a * b * cell[1][1];
+        const Gradient<2> g = (1 - a) * (1 - b) * cell[0][0] + a * (1 - b) * cell[0][1] + (1 - a) * b * cell[1][0] + a * b * cell[1][1];
         const double X = bx * (1 + mean.xx / 2), Y = by * (1 + mean.yy / 2);
         const double nx[] = {std::max(0.0, -X), 1 - std::abs(X), std::max(0.0, X)},
                      ny[] = {std::max(0.0, -Y), 1 - std::abs(Y), std::max(0.0, Y)};
         for (int j = 0; j < 3; ++j)
             for (int i = 0; i < 3; ++i)
             {
-                const Vec2 w = velocity_of({bin.first + i, bin.second + j});
+                const Vec<2> w = velocity_of({bin.first + i, bin.second + j});
                 p.x += nx[i] * ny[j] * w[0] * dt;
                 p.y += nx[i] * ny[j] * w[1] * dt;
             }
@@ -335,7 +335,7 @@ struct RefLpfdm
         p.hy *= ref_ratio(g.yy);
     }
     /// @param initial (point, position of a node) -> velocity that the point's body gives the node
-    void step(double dt, const Vec2& gravity, const std::function<Vec2(std::size_t, Vec2)>& initial)
+    void step(double dt, const Vec<2>& gravity, const std::function<Vec<2>(std::size_t, Vec<2>)>& initial)
     {
         std::map<Key, Cell> cells;
         const double L = grid.L;
@@ -356,7 +356,7 @@ struct RefLpfdm
                 c.s.xy += w * V * p.s.xy / (L * L);
             }
         std::map<Key, double> m;
-        std::map<Key, Vec2> F;
+        std::map<Key, Vec<2>> F;
         const auto corners = [](const Key& k) {
             return std::vector<Key>{{k.first, k.second}, {k.first + 1, k.second}, {k.first, k.second + 1}, {k.first + 1, k.second + 1}};
         };
@@ -376,14 +376,14 @@ struct RefLpfdm
                 for (const auto& [k, w] : cells_of(points[n]))
                     for (const Key& node : corners(k))
                     {
-                        const Vec2 given = initial(n, {grid.ox + node.first * L, grid.oy + node.second * L});
+                        const Vec<2> given = initial(n, {grid.ox + node.first * L, grid.oy + node.second * L});
                         for (int d = 0; d < 2; ++d)
                             v[node][d] += w * points[n].m / 4 * given[d] / m[node];
                     }
         else
         {
-            const std::map<Key, Vec2> before = v;
-            std::map<Key, Vec2> now;
+            const std::map<Key, Vec<2>> before = v;
+            std::map<Key, Vec<2>> now;
             for (const auto& [k, mass] : m)
             {
                 if (before.count(k))
@@ -392,7 +392,7 @@ struct RefLpfdm
                     continue;
                 }
                 double total = 0;
-                Vec2 p{0, 0};
+                Vec<2> p{0, 0};
                 for (int dj = -1; dj <= 1; ++dj)
                     for (int di = -1; di <= 1; ++di)
                         if (const Key n{k.first + di, k.second + dj}; before.count(n))
@@ -402,11 +402,11 @@ struct RefLpfdm
                             p[0] += w * before.at(n)[0];
                             p[1] += w * before.at(n)[1];
                         }
-                now[k] = total > 0 ? Vec2{p[0] / total, p[1] / total} : Vec2{0, 0};
+                now[k] = total > 0 ? Vec<2>{p[0] / total, p[1] / total} : Vec<2>{0, 0};
             }
             v = now;
             gradients(cells, last_dt);
-            const std::map<Key, Vec2> u = v;
+            const std::map<Key, Vec<2>> u = v;
             if (two_sided)
             {
                 find_faces(cells, m);
@@ -417,7 +417,7 @@ struct RefLpfdm
                 if (two_sided)
                     break;
                 const double cx = u.at(k)[0] * last_dt / L, cy = u.at(k)[1] * last_dt / L;
-                Gradient<> g{};
+                Gradient<2> g{};
                 double total = 0;
                 for (int dj = -1; dj <= 0; ++dj)
                     for (int di = -1; di <= 0; ++di)
@@ -428,14 +428,14 @@ struct RefLpfdm
                         double weight = cells[c].M * (di < 0 ? 1 + cx : 1 - cx) * (dj < 0 ? 1 + cy : 1 - cy);
                         if (!central)
                             weight = (di < 0) == (cx > 0) && (dj < 0) == (cy > 0);
-                        const Gradient<>& q = cells[c].g;
+                        const Gradient<2>& q = cells[c].g;
                         g = {g.xx + weight * q.xx, g.yy + weight * q.yy, g.xy + weight * q.xy, g.yx + weight * q.yx};
                         total += weight;
                     }
                 if (total <= 0)
                     continue;
                 g = {g.xx / total, g.yy / total, g.xy / total, g.yx / total};
-                const Vec2 before = u.at(k);
+                const Vec<2> before = u.at(k);
                 for (int sweep = 0; sweep < (central ? 60 : 1); ++sweep)  // v' = v - G v', by repetition
                     w = {before[0] - w[0] * g.xx - w[1] * g.xy, before[1] - w[0] * g.yx - w[1] * g.yy};
             }
@@ -444,7 +444,7 @@ struct RefLpfdm
         for (const auto& [k, c] : cells)
         {
             const auto node = corners(k);
-            Vec2 q{0, 0};
+            Vec<2> q{0, 0};
             for (int n = 0; n < 4; ++n)
                 for (int d = 0; d < 2; ++d)
                     q[d] += sign[n] * v[node[n]][d];
@@ -472,10 +472,10 @@ struct RefLpfdm
                 move_from_mid_step(p, dt);
                 continue;
             }
-            Gradient<> g{};
+            Gradient<2> g{};
             for (const auto& [k, w] : cells_of(p))
             {
-                const Gradient<>& q = cells[k].g;
+                const Gradient<2>& q = cells[k].g;
                 g = {g.xx + w * q.xx, g.yy + w * q.yy, g.xy + w * q.xy, g.yx + w * q.yx};
             }
             const double cx = (p.x - grid.ox) / L, cy = (p.y - grid.oy) / L;
@@ -483,7 +483,7 @@ struct RefLpfdm
             const double a = cx - i, b = cy - j;
             for (int n = 0; n < 4; ++n)
             {
-                const Vec2 w = v[{i + n % 2, j + n / 2}];
+                const Vec<2> w = v[{i + n % 2, j + n / 2}];
                 const double N = (n % 2 ? a : 1 - a) * (n / 2 ? b : 1 - b);
                 p.x += N * w[0] * dt;
                 p.y += N * w[1] * dt;
@@ -514,7 +514,7 @@ struct RefMpm
     struct Node
     {
         double m = 0;
-        Vec2 p{0, 0}, f{0, 0}, v{0, 0}, dv{0, 0};
+        Vec<2> p{0, 0}, f{0, 0}, v{0, 0}, dv{0, 0};
     };
     struct Shape
     {
@@ -573,10 +573,10 @@ struct RefMpm
         }
     }
     /// S S+ of a velocity of the points.
-    std::vector<Vec2> smoothed(const std::vector<Vec2>& v) const
+    std::vector<Vec<2>> smoothed(const std::vector<Vec<2>>& v) const
     {
         std::map<Key, double> mass;
-        std::map<Key, Vec2> momentum;
+        std::map<Key, Vec<2>> momentum;
         for (std::size_t n = 0; n < points.size(); ++n)
             for (const Shape& s : shapes(points[n]))
             {
@@ -584,7 +584,7 @@ struct RefMpm
                 for (int d = 0; d < 2; ++d)
                     momentum[s.node][d] += points[n].m * s.N * v[n][d];
             }
-        std::vector<Vec2> out(points.size(), Vec2{0, 0});
+        std::vector<Vec<2>> out(points.size(), Vec<2>{0, 0});
         for (std::size_t n = 0; n < points.size(); ++n)
             for (const Shape& s : shapes(points[n]))
                 for (int d = 0; d < 2; ++d)
@@ -593,14 +593,14 @@ struct RefMpm
         return out;
     }
     /// (1 - S S+)^m of the velocity of the points: what XPIC(m) takes.
-    std::vector<Vec2> taken_by_xpic() const
+    std::vector<Vec<2>> taken_by_xpic() const
     {
-        std::vector<Vec2> v;
+        std::vector<Vec<2>> v;
         for (const RefPoint& p : points)
             v.push_back({p.vx, p.vy});
         for (int k = 0; k < xpic; ++k)
         {
-            const std::vector<Vec2> u = smoothed(v);
+            const std::vector<Vec<2>> u = smoothed(v);
             for (std::size_t n = 0; n < v.size(); ++n)
                 v[n] = {v[n][0] - u[n][0], v[n][1] - u[n][1]};
         }
@@ -640,10 +640,10 @@ struct RefMpm
     double volume(const RefPoint& p) const { return shape == "cpgimp" ? 4 * p.hx * p.hy : p.V; }
 
     /// Slopes that make the dilatation: of the point, or averaged over its cell with volume as weight.
-    std::vector<Vec2> dilatation(std::size_t n) const
+    std::vector<Vec<2>> dilatation(std::size_t n) const
     {
         const auto own = shapes(points[n]);
-        std::vector<Vec2> out;
+        std::vector<Vec<2>> out;
         for (const Shape& s : own)
             out.push_back({s.gx, s.gy});
         if (!b_bar)
@@ -651,7 +651,7 @@ struct RefMpm
         const auto cell = [&](const RefPoint& p) {
             return Key{static_cast<int>(std::floor((p.x - grid.ox) / grid.L)), static_cast<int>(std::floor((p.y - grid.oy) / grid.L))};
         };
-        std::vector<Vec2> mean(own.size(), Vec2{0, 0});
+        std::vector<Vec<2>> mean(own.size(), Vec<2>{0, 0});
         double total = 0;
         for (const RefPoint& q : points)
             if (q.E == points[n].E && cell(q) == cell(points[n]))
@@ -664,19 +664,19 @@ struct RefMpm
                     mean[k][1] += volume(q) * other[k].gy;
                 }
             }
-        for (Vec2& g : mean)
+        for (Vec<2>& g : mean)
             g = {g[0] / total, g[1] / total};
         return mean;
     }
-    Gradient<> gradient(std::size_t n, const std::map<Key, Node>& nodes, double dt) const
+    Gradient<2> gradient(std::size_t n, const std::map<Key, Node>& nodes, double dt) const
     {
         const auto own = shapes(points[n]);
         const auto b = dilatation(n);
-        Gradient<> g{};
+        Gradient<2> g{};
         double volumetric = 0;
         for (std::size_t k = 0; k < own.size(); ++k)
         {
-            const Vec2 v = nodes.at(own[k].node).v;
+            const Vec<2> v = nodes.at(own[k].node).v;
             g.xx += own[k].gx * v[0] * dt;
             g.yy += own[k].gy * v[1] * dt;
             g.xy += own[k].gy * v[0] * dt;
@@ -700,15 +700,15 @@ struct RefMpm
                 n.p[1] += p.m * p.vy * s.N;
             }
         for (auto& [k, n] : nodes)
-            n.v = n.m > 0 ? Vec2{n.p[0] / n.m, n.p[1] / n.m} : Vec2{0, 0};
+            n.v = n.m > 0 ? Vec<2>{n.p[0] / n.m, n.p[1] / n.m} : Vec<2>{0, 0};
     }
-    void step(double dt, const Vec2& gravity)
+    void step(double dt, const Vec<2>& gravity)
     {
         std::map<Key, Node> nodes;
         if (least > 0)
             find_small_nodes();
         map_momentum(nodes);
-        const std::vector<Vec2> taken = xpic ? taken_by_xpic() : std::vector<Vec2>(points.size(), Vec2{0, 0});
+        const std::vector<Vec<2>> taken = xpic ? taken_by_xpic() : std::vector<Vec<2>>(points.size(), Vec<2>{0, 0});
         if (scheme == "usf" && !first)
             for (std::size_t n = 0; n < points.size(); ++n)
                 ref_stress(points[n], gradient(n, nodes, dt));
@@ -720,7 +720,7 @@ struct RefMpm
             const double V = volume(p), mean = 0.5 * (p.s.xx + p.s.yy);
             for (std::size_t k = 0; k < own.size(); ++k)
             {
-                Vec2& f = nodes[own[k].node].f;
+                Vec<2>& f = nodes[own[k].node].f;
                 f[0] -= V * ((p.s.xx - mean) * own[k].gx + p.s.xy * own[k].gy + mean * b[k][0]);
                 f[1] -= V * (p.s.xy * own[k].gx + (p.s.yy - mean) * own[k].gy + mean * b[k][1]);
             }
@@ -735,7 +735,7 @@ struct RefMpm
         for (std::size_t n = 0; n < points.size(); ++n)
         {
             RefPoint& p = points[n];
-            Vec2 dv{-taken[n][0], -taken[n][1]}, v{0, 0};
+            Vec<2> dv{-taken[n][0], -taken[n][1]}, v{0, 0};
             for (const Shape& s : shapes(p))
                 for (int d = 0; d < 2; ++d)
                 {
@@ -748,12 +748,12 @@ struct RefMpm
         const std::map<Key, Node> carrier = nodes;
         if (scheme == "musl")
             map_momentum(nodes);
-        std::vector<Gradient<>> g;
-        std::vector<Vec2> move;
+        std::vector<Gradient<2>> g;
+        std::vector<Vec<2>> move;
         for (std::size_t n = 0; n < points.size(); ++n)
         {
             g.push_back(gradient(n, nodes, dt));
-            Vec2 u{0, 0};
+            Vec<2> u{0, 0};
             for (const Shape& s : shapes(points[n]))
                 for (int d = 0; d < 2; ++d)
                     u[d] += s.N * carrier.at(s.node).v[d] * dt;

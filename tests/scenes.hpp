@@ -52,9 +52,9 @@ inline void expect_problem(const std::string& text, const std::vector<std::strin
 inline const std::string strength = "[material.strength]\ncohesion = 9800.0\nfriction_angle = 0.5\n";
 
 /// A box of soil on a lattice of 4 x 4 m with L = 0.5 m, over 1 s: elastic, or Mohr-Coulomb with the tables `strength`.
-inline std::string soil_block(const Vec2& min, const Vec2& max, const std::string& strength = "")
+inline std::string soil_block(const Vec<2>& min, const Vec<2>& max, const std::string& strength = "")
 {
-    const auto pair = [](const Vec2& v) { return fmt::format("[{}, {}]", v[0], v[1]); };
+    const auto pair = [](const Vec<2>& v) { return fmt::format("[{}, {}]", v[0], v[1]); };
     return R"toml(
 [grid]
 size = [4.0, 4.0]

@@ -110,23 +110,23 @@ TEST(Lanes, MaskWhatLiesBehindTheEnd)
 /// point is turned inside out; lanes behind the end do not count.
 TEST(BinFrame, SeesWhoLeft)
 {
-    const Lattice lattice{{0, 0}, 1.0, 4, 4};
-    const BinFrame frame(lattice, Bin{1, 1, 0, 1});
-    Points q;
+    const Lattice<2> lattice{{0, 0}, 1.0, {4, 4}};
+    const BinFrame frame(lattice, Bin<2>{{1, 1}, 0, 1});
+    Points<2> q;
     q.count = 2 * pack_size;
     q.volume.activate(q.count);
-    q.half_x.activate(q.count);
-    q.half_y.activate(q.count);
+    q.half_width[0].activate(q.count);
+    q.half_width[1].activate(q.count);
     const auto reset = [&]
     {
         for (std::size_t p = 0; p < q.count; ++p)
-            q.volume[p] = q.half_x[p] = q.half_y[p] = 0.2;
+            q.volume[p] = q.half_width[0][p] = q.half_width[1][p] = 0.2;
     };
     const auto left = [&](double ax, double ay)
     {
-        Corner c{Pack(0.5), Pack(0.5), Pack(0.4), Pack(0.4)};
-        c.ax[pack_size - 1] = ax;
-        c.ay[pack_size - 1] = ay;
+        Corner<2> c{{Pack(0.5), Pack(0.5)}, {Pack(0.4), Pack(0.4)}};
+        c.a[0][pack_size - 1] = ax;
+        c.a[1][pack_size - 1] = ay;
         const bool point = stdx::any_of(frame.left<PointSupport>(q, 0, AllLanes{}, c)),
                    box = stdx::any_of(frame.left<DomainSupport>(q, 0, AllLanes{}, c));
         EXPECT_EQ(point, box);
@@ -141,10 +141,10 @@ TEST(BinFrame, SeesWhoLeft)
         EXPECT_TRUE(left(out, 0.5)) << out;
         EXPECT_TRUE(left(0.5, out)) << out;
     }
-    const Corner inside{Pack(0.5), Pack(0.5), Pack(0.4), Pack(0.4)};
+    const Corner<2> inside{{Pack(0.5), Pack(0.5)}, {Pack(0.4), Pack(0.4)}};
     for (const double bad : {0.0, -1.0, nan})
     {
-        for (Field<double>* field : {&q.half_x, &q.half_y})
+        for (Field<double>* field : {&q.half_width[0], &q.half_width[1]})
         {
             reset();
             (*field)[0] = bad;
@@ -158,15 +158,15 @@ TEST(BinFrame, SeesWhoLeft)
     for (const double a : {0.4, 0.6})  // B-splines begin half a cell from the point: the edge of the lattice lies in the middle of a bin
         for (const int first : {-1, 3})
         {
-            const Corner c{Pack(a), Pack(a), Pack(0.0), Pack(0.0)};
-            const Bin left_or_right{first, 1, 0, 1}, low_or_high{1, first, 0, 1};
-            for (const Bin& bin : {left_or_right, low_or_high})
+            const Corner<2> c{{Pack(a), Pack(a)}, {Pack(0.0), Pack(0.0)}};
+            const Bin<2> left_or_right{{first, 1}, 0, 1}, low_or_high{{1, first}, 0, 1};
+            for (const Bin<2>& bin : {left_or_right, low_or_high})
                 EXPECT_EQ(stdx::any_of(BinFrame(lattice, bin).left<BSplineShape>(q, 0, AllLanes{}, c)), (a < 0.5) == (first < 0)) << a;
         }
-    Corner behind = inside;
+    Corner<2> behind = inside;
     if (pack_size > 1)
     {
-        behind.ax[pack_size - 1] = nan;
+        behind.a[0][pack_size - 1] = nan;
         EXPECT_FALSE(stdx::any_of(frame.left<PointSupport>(q, 0, SomeLanes{pack_size - 1}, behind)));
         EXPECT_TRUE(stdx::any_of(frame.left<PointSupport>(q, 0, AllLanes{}, behind)));
     }

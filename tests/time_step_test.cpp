@@ -70,9 +70,9 @@ bool is_unstable(const Scene& scene, double dt, int steps = 2000)
         for (std::size_t p = 0; p < solver->bodies()[0].points.count; ++p)
             for (const double component : solver->velocity(0, p))
                 v = std::isfinite(component) ? std::max(v, std::abs(component)) : 1e300;
-        const Points& q = solver->bodies()[0].points;
+        const Points<2>& q = solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            for (const double s : {q.sxx[p], q.syy[p], q.sxy[p]})
+            for (const double s : {q.stress[0][p], q.stress[1][p], q.stress[2][p]})
                 v = std::isfinite(s) ? std::max(v, std::abs(s)) : 1e300;
         return v;
     };
@@ -314,9 +314,9 @@ fix = "y"
             solver->advance(step);
             t += step;
         }
-        const Points& q = solver->bodies()[0].points;
+        const Points<2>& q = solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            x[q.id[p]] = q.x[p];
+            x[q.id[p]] = q.x[0][p];
         return x;
     };
     const double until = 24;  // one and a half periods
@@ -401,10 +401,10 @@ TEST(AutoStep, EndsAtTheEndWhateverTheSteps)
         });
     EXPECT_DOUBLE_EQ(end, 7.3);
     // a fall is exact for any steps: none of them went farther than the clock says
-    const Points& q = solver->bodies()[0].points;
+    const Points<2>& q = solver->bodies()[0].points;
     for (std::size_t p = 0; p < q.count; ++p)
         if (q.id[p] == 0)
-            EXPECT_NEAR(q.y[p], 3.25 - 0.5 * 0.02 * 7.3 * 7.3, 1e-6);
+            EXPECT_NEAR(q.x[1][p], 3.25 - 0.5 * 0.02 * 7.3 * 7.3, 1e-6);
     EXPECT_LT(shortest, 0.8 * 0.5 * std::sqrt(0.7));
 }
 
@@ -453,9 +453,9 @@ TEST(AutoStep, FollowsTheContentOfCells)
     EXPECT_LT(first, 1e-3);
     EXPECT_GT(longest, 0.1);
     EXPECT_LT(share, 0.5);
-    const Points& q = solver->bodies()[0].points;
+    const Points<2>& q = solver->bodies()[0].points;
     for (std::size_t p = 0; p < q.count; ++p)
-        EXPECT_LT(std::abs(q.sxx[p]) + std::abs(q.syy[p]), 1e-6);
+        EXPECT_LT(std::abs(q.stress[0][p]) + std::abs(q.stress[1][p]), 1e-6);
 }
 
 namespace
@@ -524,7 +524,7 @@ TEST(DensityScaling, RaisesMassesNotWeight)
 {
     const Scene scene = test::load(block_with_inclusion(1e6, footing), "lpfdm");
     const auto solver = make(scene);
-    const Points &soft = solver->bodies()[0].points, &stiff = solver->bodies()[1].points;
+    const Points<2>&soft = solver->bodies()[0].points, &stiff = solver->bodies()[1].points;
     EXPECT_DOUBLE_EQ(soft.mass, 0.25);
     EXPECT_NEAR(stiff.mass / 0.25e6, 1, 1e-12);
     EXPECT_NEAR(stiff.mass * stiff.weight_share, 0.25, 1e-12);
@@ -555,9 +555,9 @@ AtRest rest(double contrast, const Box& box, const std::string& method, std::vec
     for (const Body& body : solver->bodies())
         for (std::size_t p = 0; p < body.points.count; ++p)
         {
-            const Points& q = body.points;
+            const Points<2>& q = body.points;
             out.stress.resize(std::max<std::size_t>(out.stress.size(), q.id[p] + 1));
-            out.stress[q.id[p]] = {q.sxx[p], q.syy[p], q.sxy[p]};
+            out.stress[q.id[p]] = {q.stress[0][p], q.stress[1][p], q.stress[2][p]};
         }
     return out;
 }

@@ -28,16 +28,16 @@ struct Sums
 {
     double fx = 0, fy = 0, moment_x = 0, moment_y = 0, off = 0;
 
-    Sums(const Lattice& lattice, const Nodes& nodes, std::size_t k, double at)
+    Sums(const Lattice<2>& lattice, const Nodes<2>& nodes, std::size_t k, double at)
     {
         for (std::size_t n = 0; n < lattice.nodes(); ++n)
         {
-            const Vec2 x = lattice.node_position(n);
-            fx += nodes.fx[n];
-            fy += nodes.fy[n];
-            moment_x += x[1] * nodes.fx[n];
-            moment_y += x[0] * nodes.fy[n];
-            off += std::abs(x[k] - at) > 1e-9 ? std::abs(nodes.fx[n]) + std::abs(nodes.fy[n]) : 0;
+            const Vec<2> x = lattice.node_position(n);
+            fx += nodes.f[0][n];
+            fy += nodes.f[1][n];
+            moment_x += x[1] * nodes.f[0][n];
+            moment_y += x[0] * nodes.f[1][n];
+            off += std::abs(x[k] - at) > 1e-9 ? std::abs(nodes.f[0][n]) + std::abs(nodes.f[1][n]) : 0;
         }
     }
 };
@@ -51,9 +51,9 @@ TEST(Tractions, ActOnEachFace)
         {
             SCOPED_TRACE(face.name);
             const Scene scene = loaded(face.name, face.normal == 0 ? "[\"1e4*(1+Y)\", \"-2e3\"]" : "[\"3e3\", \"1e4*(1+X)\"]");
-            const Lattice lattice = make_lattice(scene.grid);
+            const Lattice<2> lattice = make_lattice(scene.grid);
             const auto bodies = make_bodies(scene, lattice, {.box = box});
-            Nodes nodes(lattice.nodes());
+            Nodes<2> nodes(lattice.nodes());
             std::fill(nodes.mass.begin(), nodes.mass.end(), 1.0);
             Tractions(scene).apply(lattice, bodies, nodes, 0);
             const Sums s(lattice, nodes, face.normal, face.at);
@@ -69,21 +69,21 @@ TEST(Tractions, ActOnEachFace)
 TEST(Tractions, FollowTheSurface)
 {
     const Scene scene = loaded("left", "[\"1e4\", \"3e3\"]");
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     for (const bool box : {false, true})
     {
         auto bodies = make_bodies(scene, lattice, {.box = box});
-        Nodes nodes(lattice.nodes());
+        Nodes<2> nodes(lattice.nodes());
         std::fill(nodes.mass.begin(), nodes.mass.end(), 1.0);
         const Tractions tractions(scene);
         for (std::size_t p = 0; p < bodies[0].points.count; ++p)
-            bodies[0].points.x[p] -= 0.1;  // a fifth of a cell outwards
+            bodies[0].points.x[0][p] -= 0.1;  // a fifth of a cell outwards
         tractions.apply(lattice, bodies, nodes, 0);
         EXPECT_NEAR(Sums(lattice, nodes, 0, 1).off, 0.2 * (2e4 + 6e3), 1e-6);
         for (std::size_t n = 0; n < lattice.nodes(); ++n)
         {
             nodes.mass[n] = lattice.node_position(n)[0] < 0.9 ? 0 : 1;  // the next line of nodes holds nothing yet
-            nodes.fx[n] = nodes.fy[n] = 0;
+            nodes.f[0][n] = nodes.f[1][n] = 0;
         }
         tractions.apply(lattice, bodies, nodes, 0);
         const Sums s(lattice, nodes, 0, 1);
@@ -100,23 +100,23 @@ TEST(Tractions, ActOnTheEdgeOfAStretchedBox)
     {
         SCOPED_TRACE(face.name);
         const Scene scene = loaded(face.name, "[\"7\", \"7\"]");
-        const Lattice lattice = make_lattice(scene.grid);
+        const Lattice<2> lattice = make_lattice(scene.grid);
         auto bodies = make_bodies(scene, lattice, {.box = true});
-        Points& q = bodies[0].points;
+        Points<2>& q = bodies[0].points;
         const double h = 1.0 / 6;
         for (std::size_t p = 0; p < q.count; ++p)
         {
-            q.half_x[p] *= 1.2;
-            q.half_y[p] *= 0.7;
+            q.half_width[0][p] *= 1.2;
+            q.half_width[1][p] *= 0.7;
         }
-        Nodes nodes(lattice.nodes());
+        Nodes<2> nodes(lattice.nodes());
         std::fill(nodes.mass.begin(), nodes.mass.end(), 1.0);
         Tractions(scene).apply(lattice, bodies, nodes, 0);
         double force = 0, moment = 0;
         for (std::size_t n = 0; n < lattice.nodes(); ++n)
         {
-            force += nodes.fx[n];
-            moment += lattice.node_position(n)[face.normal] * nodes.fx[n];
+            force += nodes.f[0][n];
+            moment += lattice.node_position(n)[face.normal] * nodes.f[0][n];
         }
         const double outward = face.at > 2 ? 1 : -1, moved = 0.5 * h * ((face.normal == 0 ? 1.2 : 0.7) - 1);
         EXPECT_NEAR(force, 14, 1e-9);

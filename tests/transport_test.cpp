@@ -25,13 +25,13 @@ std::string material(double youngs_modulus, double poissons_ratio, double densit
     return fmt::format("[[material]]\nname = \"m\"\nlaw = \"{}\"\ndensity = {}\nyoungs_modulus = {}\npoissons_ratio = {}\n", law, density,
                        youngs_modulus, poissons_ratio);
 }
-std::string box(const Vec2& min, const Vec2& max, int points_per_cell, const std::string& velocity = "")
+std::string box(const Vec<2>& min, const Vec<2>& max, int points_per_cell, const std::string& velocity = "")
 {
     return fmt::format(
         "[[body]]\nname = \"b\"\nmaterial = \"m\"\nshape = \"box\"\nmin = [{}, {}]\nmax = [{}, {}]\npoints_per_cell = {}\n{}", min[0],
         min[1], max[0], max[1], points_per_cell, velocity.empty() ? "" : "velocity = " + velocity + "\n");
 }
-std::string lattice(double width, double height, double cell_size = 1, const Vec2& origin = {0, 0})
+std::string lattice(double width, double height, double cell_size = 1, const Vec<2>& origin = {0, 0})
 {
     return fmt::format("[grid]\norigin = [{}, {}]\nsize = [{}, {}]\ncell_size = {}\n[time]\nend = 1.0\n", origin[0], origin[1], width,
                        height, cell_size);
@@ -46,7 +46,7 @@ struct Patch
 {
     static constexpr int first = 2, last = 6;  ///< cells
     Scene scene = test::load(lattice(10, 10) + material(1, 0) + box({2, 2}, {7, 7}, 2), "lpfdm");
-    LpfdmGrid grid{make_lattice(scene.grid)};
+    LpfdmGrid<2> grid{make_lattice(scene.grid)};
     FreeFaces faces{grid.lattice.nodes()};
     std::vector<double> before;
     std::vector<Body> bodies = make_bodies(scene, grid.lattice, {.box = true});
@@ -57,11 +57,11 @@ struct Patch
     {
         std::vector<double> workspace;
         bodies[0].bins.rebuild<DomainSupport>(bodies[0].points, workspace);
-        const Bins* bins = &bodies[0].bins;
+        const Bins<2>* bins = &bodies[0].bins;
         grid.rebuild<2>({&bins, 1});
         for (int j = first; j <= last; ++j)
             for (int i = first; i <= last; ++i)
-                grid.cells.mass[grid.lattice.cell(i, j)] = mass(i, j);
+                grid.cells.mass[grid.lattice.cell({i, j})] = mass(i, j);
         nodal_forces(grid);
         before = grid.nodes.mass;
         faces.full_mass = 1;
@@ -72,13 +72,13 @@ struct Patch
         for (const auto n : grid.nodes.active())
             if (grid.nodes.mass[n] > 0)
             {
-                const Vec2 v = field(grid.lattice.node_position(n));
-                grid.nodes.vx[n] = v[0];
-                grid.nodes.vy[n] = v[1];
+                const Vec<2> v = field(grid.lattice.node_position(n));
+                grid.nodes.v[0][n] = v[0];
+                grid.nodes.v[1][n] = v[1];
             }
     }
-    Vec2 velocity(std::uint32_t n) const { return {grid.nodes.vx[n], grid.nodes.vy[n]}; }
-    std::uint32_t node(int i, int j) const { return static_cast<std::uint32_t>(grid.lattice.node(i, j)); }
+    Vec<2> velocity(std::uint32_t n) const { return {grid.nodes.v[0][n], grid.nodes.v[1][n]}; }
+    std::uint32_t node(int i, int j) const { return static_cast<std::uint32_t>(grid.lattice.node({i, j})); }
     /// Gradients of the cells and nodes over dt, and the faces.
     void find(double dt)
     {
@@ -86,9 +86,10 @@ struct Patch
         faces.find(grid);
         faces.keep(
             grid,
-            [&](std::size_t c, const auto& lanes, const Velocity&)
-            { return CentralConvection::gradient(grid, c, lanes, Pack(0.0), Pack(0.0)); },
-            [](const Velocity& v, const Gradient<Pack>&) { return v; });
+            [&](std::size_t c, const auto& lanes, const Vec<2, Pack>&) {
+                return CentralConvection::gradient<2>(grid, c, lanes, {Pack(0.0), Pack(0.0)});
+            },
+            [](const Vec<2, Pack>& v, const Gradient<2, Pack>&) { return v; });
     }
 };
 
@@ -102,8 +103,8 @@ struct Ring
     }
 };
 
-const Gradient<> rate{0.3, -0.2, 0.7, 0.4};
-Vec2 linear(const Vec2& x)
+const Gradient<2> rate{0.3, -0.2, 0.7, 0.4};
+Vec<2> linear(const Vec<2>& x)
 {
     return {1 + rate.xx * x[0] + rate.xy * x[1], -1 + rate.yx * x[0] + rate.yy * x[1]};
 }
@@ -129,10 +130,10 @@ TEST(FreeFaces, LinearFieldArrivesExactly)
             int nodes = 0;
             for (const auto n : p.grid.nodes.active())
             {
-                const Vec2 x = p.grid.lattice.node_position(n), v = p.velocity(n);
+                const Vec<2> x = p.grid.lattice.node_position(n), v = p.velocity(n);
                 if (p.grid.nodes.mass[n] > 0)
                 {
-                    const Vec2 arrives = linear({x[0] - 0.5 * dt * v[0], x[1] - 0.5 * dt * v[1]});
+                    const Vec<2> arrives = linear({x[0] - 0.5 * dt * v[0], x[1] - 0.5 * dt * v[1]});
                     EXPECT_NEAR(v[0], arrives[0], 1e-13) << outer << " " << x[0] << " " << x[1];
                     EXPECT_NEAR(v[1], arrives[1], 1e-13) << outer << " " << x[0] << " " << x[1];
                     ++nodes;
@@ -147,17 +148,17 @@ TEST(FreeFaces, LinearFieldArrivesExactly)
 TEST(FreeFaces, GradientAcrossIsOfTheNextLayer)
 {
     Patch p{Ring{1}};
-    const auto field = [](const Vec2& x) { return Vec2{std::sin(x[0] + 2 * x[1]) - 9, std::cos(3 * x[0] - x[1]) - 9}; };
+    const auto field = [](const Vec<2>& x) { return Vec<2>{std::sin(x[0] + 2 * x[1]) - 9, std::cos(3 * x[0] - x[1]) - 9}; };
     p.set(field);
     p.find(0.1);
     const auto at = [&](int i, int j) { return p.faces.across(p.grid, p.node(i, j), 1, 1); };
-    const Gradient<> face = at(7, 4), corner = at(7, 7);
-    EXPECT_EQ(corner.xx, p.grid.cells.xx[p.grid.lattice.cell(5, 6)]);
-    EXPECT_EQ(corner.xy, p.grid.cells.xy[p.grid.lattice.cell(6, 5)]);
+    const Gradient<2> face = at(7, 4), corner = at(7, 7);
+    EXPECT_EQ(corner.xx, p.grid.cells.gradient[0][p.grid.lattice.cell({5, 6})]);
+    EXPECT_EQ(corner.xy, p.grid.cells.gradient[2][p.grid.lattice.cell({6, 5})]);
     for (const auto n : {p.node(7, 4), p.node(7, 7)})
     {
-        p.grid.nodes.vx[n] += 5;
-        p.grid.nodes.vy[n] -= 3;
+        p.grid.nodes.v[0][n] += 5;
+        p.grid.nodes.v[1][n] -= 3;
     }
     p.find(0.1);
     EXPECT_EQ(at(7, 4).xx, face.xx);
@@ -175,11 +176,11 @@ TEST(FreeFaces, LeadingFaceTakesFromShortWaves)
 {
     struct Side
     {
-        Vec2 out;
+        Vec<2> out;
         int i, j;
     };
     for (const Side& side : {Side{{1, 0}, 7, 4}, Side{{-1, 0}, 2, 4}, Side{{0, 1}, 4, 7}, Side{{0, -1}, 4, 2}})
-        for (const Vec2& direction : {side.out, Vec2{side.out[1], side.out[0]}})  // of the wave's velocity: along or across
+        for (const Vec<2>& direction : {side.out, Vec<2>{side.out[1], side.out[0]}})  // of the wave's velocity: along or across
         {
             const bool x = side.out[0] != 0, along = direction == side.out;
             // velocity with these differences from the node to the next one inside, and on to the one after
@@ -187,15 +188,15 @@ TEST(FreeFaces, LeadingFaceTakesFromShortWaves)
             {
                 Patch p{Ring{1}};
                 p.set(
-                    [&](const Vec2& at)
+                    [&](const Vec<2>& at)
                     {
                         const double depth = std::abs(side.out[0] * (side.i - at[0]) + side.out[1] * (side.j - at[1]));
                         const double v = depth < 0.5 ? at_face + inside : depth < 1.5 ? inside : 0;
-                        return Vec2{side.out[0] * speed + v * direction[0] - spin * (at[1] - side.j),
-                                    side.out[1] * speed + v * direction[1] + spin * (at[0] - side.i)};
+                        return Vec<2>{side.out[0] * speed + v * direction[0] - spin * (at[1] - side.j),
+                                      side.out[1] * speed + v * direction[1] + spin * (at[0] - side.i)};
                     });
                 p.find(0.1);
-                const Gradient<> g = p.faces.across(p.grid, p.node(side.i, side.j), 1, its);
+                const Gradient<2> g = p.faces.across(p.grid, p.node(side.i, side.j), 1, its);
                 const double sign = direction[0] + direction[1];
                 const double found = along ? (x ? g.xx : g.yy) : (x ? g.yx - 0.1 * spin : g.xy + 0.1 * spin);
                 EXPECT_NEAR(along ? (x ? g.yx - 0.1 * spin : g.xy + 0.1 * spin) : (x ? g.xx : g.yy), 0, 1e-12);
@@ -222,14 +223,14 @@ TEST(FreeFaces, ArrivalGoesNoFurtherThanTheNode)
 {
     test::Random random(9);
     Patch p{Ring{1}};
-    p.set([&](const Vec2&) { return Vec2{random(-1, 1), random(-1, 1)}; });
+    p.set([&](const Vec<2>&) { return Vec<2>{random(-1, 1), random(-1, 1)}; });
     p.find(0.1);
     int shorter = 0;
     for (const auto n : p.faces.list())
     {
         const auto near = p.faces.around(p.grid, &p.before, n, 10);
-        const Vec2 v = p.velocity(n), with = p.faces.arriving(p.grid, &p.before, n, 10, v, 0),
-                   without = p.faces.arriving(p.grid, &p.before, n, 10, v, 1);
+        const Vec<2> v = p.velocity(n), with = p.faces.arriving(p.grid, &p.before, n, 10, v, 0),
+                     without = p.faces.arriving(p.grid, &p.before, n, 10, v, 1);
         const double own = std::hypot(v[0] - near.mean[0], v[1] - near.mean[1]),
                      far = std::hypot(with[0] - near.mean[0], with[1] - near.mean[1]);
         EXPECT_LE(far, own * (1 + 1e-12));
@@ -248,11 +249,11 @@ TEST(FreeFaces, SliversFollow)
     Patch p([&](int i, int) { return i == Patch::last ? light : 1.0; });
     p.set(linear);
     const auto n = p.node(7, 4);  // beside a sliver, and nothing
-    p.grid.nodes.vx[n] = 40;
+    p.grid.nodes.v[0][n] = 40;
     cell_gradients(p.grid, dt);
     p.faces.find(p.grid);
     convect(p.grid, p.faces, dt, 0.5, nullptr);
-    const Vec2 x = p.grid.lattice.node_position(n), v = p.velocity(n), arrives = linear({x[0] - 0.5 * dt * v[0], x[1] - 0.5 * dt * v[1]});
+    const Vec<2> x = p.grid.lattice.node_position(n), v = p.velocity(n), arrives = linear({x[0] - 0.5 * dt * v[0], x[1] - 0.5 * dt * v[1]});
     const double excess = 40 - linear(x)[0];
     EXPECT_NEAR(v[0], arrives[0], 1e-4 * excess);
     EXPECT_NEAR(v[1], arrives[1], 1e-4 * excess);
@@ -267,7 +268,7 @@ TEST(FreeFaces, HalfTakesOfTheFourthOrder)
         {
             const double V = 3, amplitude = 1e-7, dt = 2 * c / V;
             Patch p{Ring{1}};
-            p.set([&](const Vec2& x) { return Vec2{V + amplitude * std::sin(theta * x[0]), 0.0}; });
+            p.set([&](const Vec<2>& x) { return Vec<2>{V + amplitude * std::sin(theta * x[0]), 0.0}; });
             cell_gradients(p.grid, dt);
             p.faces.find(p.grid);
             convect(p.grid, p.faces, dt, 0.5, nullptr);
@@ -281,10 +282,10 @@ TEST(FreeFaces, HalfTakesOfTheFourthOrder)
 TEST(FreeFaces, NoneAtRest)
 {
     Patch p{Ring{1}};
-    p.set([](const Vec2&) { return Vec2{0, 0}; });
+    p.set([](const Vec<2>&) { return Vec<2>{0, 0}; });
     p.find(0.1);
     EXPECT_TRUE(p.faces.list().empty());
-    p.set([](const Vec2&) { return Vec2{1, 0}; });
+    p.set([](const Vec<2>&) { return Vec<2>{1, 0}; });
     p.find(0.1);
     EXPECT_EQ(p.faces.list().size(), 12);  // both faces across x
 }
@@ -292,19 +293,19 @@ TEST(FreeFaces, NoneAtRest)
 namespace
 {
 /// Where a small box at x goes in a linear field v = V + G (x - centre), in one step.
-Vec2 moved(double theta, const Vec2& at, double dt)
+Vec<2> moved(double theta, const Vec<2>& at, double dt)
 {
     Patch p{Ring{1}};
     for (const auto n : p.grid.nodes.active())
     {
-        const Vec2 v = linear(p.grid.lattice.node_position(n));
-        p.grid.nodes.vx[n] = v[0];
-        p.grid.nodes.vy[n] = v[1];
+        const Vec<2> v = linear(p.grid.lattice.node_position(n));
+        p.grid.nodes.v[0][n] = v[0];
+        p.grid.nodes.v[1][n] = v[1];
     }
     cell_gradients(p.grid, dt);
-    const Bin* bin = nullptr;
-    for (const Bin& b : p.bodies[0].bins.list())
-        if (b.i == 4 && b.j == 4)
+    const Bin<2>* bin = nullptr;
+    for (const Bin<2>& b : p.bodies[0].bins.list())
+        if (b.at[0] == 4 && b.at[1] == 4)
             bin = &b;
     if (!bin)
         throw std::logic_error("no such bin");
@@ -312,15 +313,15 @@ Vec2 moved(double theta, const Vec2& at, double dt)
     mid_steps.resize(p.grid.lattice.nodes());
     mid_steps.find(p.grid, theta, dt);
     const BinMotion<DomainSupport> motion(p.grid, *bin, mid_steps);
-    Pack x(at[0]), y(at[1]);
-    const Vec2 from = motion.origin();
-    motion(Box{Pack(at[0] - bin->i - from[0]), Pack(at[1] - bin->j - from[1]), Pack(0.25), Pack(0.25)}, dt, x, y);
-    return {x[0], y[0]};
+    Vec<2, Pack> x{Pack(at[0]), Pack(at[1])};
+    const Vec<2> from = motion.origin();
+    motion(Box<2>{{Pack(at[0] - bin->at[0] - from[0]), Pack(at[1] - bin->at[1] - from[1])}, {Pack(0.25), Pack(0.25)}}, dt, x);
+    return {x[0][0], x[1][0]};
 }
 /// x + (e^(G t) - 1) G^-1 v(x), by its series.
-Vec2 carried(const Vec2& x, double dt)
+Vec<2> carried(const Vec<2>& x, double dt)
 {
-    Vec2 term = linear(x), sum{x[0], x[1]};
+    Vec<2> term = linear(x), sum{x[0], x[1]};
     double factor = 1;
     for (int k = 1; k < 20; ++k)
     {
@@ -335,11 +336,11 @@ Vec2 carried(const Vec2& x, double dt)
 /// In a linear field a step from its middle is of second order, from its start of first.
 TEST(MidStep, CarriedByALinearField)
 {
-    for (const Vec2& at : {Vec2{4.75, 4.75}, Vec2{5.1, 4.8}, Vec2{5.0, 5.3}})
+    for (const Vec<2>& at : {Vec<2>{4.75, 4.75}, Vec<2>{5.1, 4.8}, Vec<2>{5.0, 5.3}})
     {
         const auto error = [&](double theta, double dt)
         {
-            const Vec2 a = moved(theta, at, dt), b = carried(at, dt);
+            const Vec<2> a = moved(theta, at, dt), b = carried(at, dt);
             return std::hypot(a[0] - b[0], a[1] - b[1]);
         };
         EXPECT_NEAR(error(0.5, 0.04) / error(0.5, 0.02), 8, 0.6);
@@ -367,7 +368,7 @@ Course run(const std::string& text, const std::vector<std::string>& overrides, d
     Course c;
     c.scene = test::load(text, "lpfdm", overrides);
     c.solver = make_lpfdm(c.scene);
-    const Vec2 g = c.scene.gravity ? c.scene.gravity->acceleration : Vec2{0, 0};
+    const Vec<2> g = c.scene.gravity ? c.scene.gravity->acceleration : Vec<2>{0, 0};
     double start = 0, fallen = 0;
     const int steps = static_cast<int>(std::ceil(end / dt));
     try
@@ -379,7 +380,7 @@ Course run(const std::string& text, const std::vector<std::string>& overrides, d
             for (const Body& body : c.solver->bodies())
                 for (std::size_t p = 0; p < body.points.count; ++p)
                 {
-                    height -= body.points.mass * (g[0] * body.points.x[p] + g[1] * body.points.y[p]);
+                    height -= body.points.mass * (g[0] * body.points.x[0][p] + g[1] * body.points.x[1][p]);
                     const double ratio = body.points.current_volume(p) / body.points.initial_volume;
                     c.held = c.held && ratio > 1.0 / 3 && ratio < 3;
                 }
@@ -412,7 +413,7 @@ Course run(const std::string& text, const std::vector<std::string>& overrides, d
 struct Drop
 {
     int points_per_cell;
-    Vec2 offset;
+    Vec<2> offset;
     double nu = 0.3, modulus = 1e6, end = 1.5;
 };
 std::vector<std::string> without_hourglass(std::vector<std::string> overrides)
@@ -435,7 +436,7 @@ Course drop(const std::vector<std::string>& overrides, const Drop& d)
 TEST(Transport, DroppedBlockWinsNoEnergy)
 {
     for (const int points_per_cell : {2, 3, 4})
-        for (const Vec2& offset : {Vec2{0, 0}, Vec2{0.3, 0.3}, Vec2{0.5, 0.01}})
+        for (const Vec<2>& offset : {Vec<2>{0, 0}, Vec<2>{0.3, 0.3}, Vec<2>{0.5, 0.01}})
         {
             const Course c = drop({}, {points_per_cell, offset});
             EXPECT_TRUE(c.held) << points_per_cell << " " << offset[0];
@@ -553,10 +554,10 @@ std::pair<double, double> ratchet(const std::vector<std::string>& overrides)
         overrides, periods * period, 0.5,
         [&](const Solver& solver, double t)
         {
-            const Points& q = solver.bodies()[0].points;
+            const Points<2>& q = solver.bodies()[0].points;
             double y = 0;
             for (std::size_t p = 0; p < q.count; ++p)
-                y = std::max(y, q.y[p]);
+                y = std::max(y, q.x[1][p]);
             if (t == 0)
                 top = y;
             const int part = t < 10 * period ? 0 : t > (periods - 10) * period ? 1 : 2;
@@ -588,13 +589,13 @@ double asymmetry(const std::vector<std::string>& overrides, double step)
     const double E = 1e6, nu = 0.3, c = wave_speed(E, nu);
     const std::string velocity = fmt::format("[\"{0}*(X-6)*(2+Y)/6\", \"{0}*cos(X-6)\"]", 0.02 * c);
     const Course r = run(lattice(12, 14) + material(E, nu) + box({3.5, 4.1}, {8.5, 9.1}, 3, velocity), overrides, 30 / c, step / c);
-    const Points& q = r.solver->bodies()[0].points;
+    const Points<2>& q = r.solver->bodies()[0].points;
     double most = 0;
     for (std::size_t p = 0; p < q.count; ++p)
     {
         double nearest = 1;
         for (std::size_t m = 0; m < q.count; ++m)
-            nearest = std::min(nearest, std::hypot(q.x[p] + q.x[m] - 12, q.y[p] - q.y[m]));
+            nearest = std::min(nearest, std::hypot(q.x[0][p] + q.x[0][m] - 12, q.x[1][p] - q.x[1][m]));
         most = std::max(most, nearest);
     }
     return r.held ? most : 1;

@@ -21,9 +21,9 @@ std::string cap(const std::string& motion, const std::string& more = "")
 struct Fixture
 {
     Scene scene;
-    Lattice lattice;
+    Lattice<2> lattice;
     NodeOps ops;
-    Nodes nodes;
+    Nodes<2> nodes;
 
     explicit Fixture(const std::string& text, const std::string& method = "")
         : scene(test::load(specimen + text, method)),
@@ -44,11 +44,11 @@ struct Fixture
     /// Velocity in y that the walls leave of 1 everywhere, at column i.
     std::vector<double> column(int i)
     {
-        std::vector<double> vx(nodes.vx.size(), 1), vy(nodes.vy.size(), 1);
-        ops.restrain(lattice, nodes, vx, vy);
+        VectorField<2> v{std::vector<double>(nodes.mass.size(), 1), std::vector<double>(nodes.mass.size(), 1)};
+        ops.restrain(lattice, nodes, v);
         std::vector<double> values;
-        for (int j = 0; j <= lattice.ny; ++j)
-            values.push_back(vy[lattice.node(i, j)]);
+        for (int j = 0; j <= lattice.size[1]; ++j)
+            values.push_back(v[1][lattice.node({i, j})]);
         return values;
     }
 };
@@ -88,16 +88,16 @@ TEST(Wall, ReactionHoldsTheFace)
 {
     Fixture f("[[wall]]\nname = \"floor\"\nmin = [0.0, 0.2]\nmax = [4.0, 0.2]\nmotion = \"smooth\"\nfix = \"y\"\n");
     f.ops.begin_step({0, 0.1, 0.1});
-    const std::size_t low = f.lattice.node(3, 0), high = f.lattice.node(3, 1);
+    const std::size_t low = f.lattice.node({3, 0}), high = f.lattice.node({3, 1});
     f.nodes.mass[low] = 3;
-    f.nodes.fy[low] = -5;
-    f.nodes.fy[high] = -7;
-    f.nodes.fx[low] = 4;
+    f.nodes.f[1][low] = -5;
+    f.nodes.f[1][high] = -7;
+    f.nodes.f[0][low] = 4;
     f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
-    EXPECT_NEAR(0.6 * f.nodes.fy[low] / 3 + 0.4 * f.nodes.fy[high] / 2, 0, 1e-12);
-    EXPECT_NEAR(f.ops.records()[0].reaction[1], f.nodes.fy[low] + f.nodes.fy[high] + 12, 1e-12);
+    EXPECT_NEAR(0.6 * f.nodes.f[1][low] / 3 + 0.4 * f.nodes.f[1][high] / 2, 0, 1e-12);
+    EXPECT_NEAR(f.ops.records()[0].reaction[1], f.nodes.f[1][low] + f.nodes.f[1][high] + 12, 1e-12);
     EXPECT_GT(f.ops.records()[0].reaction[1], 0);
-    EXPECT_EQ(f.nodes.fx[low], 4);  // a smooth wall does not hold what slides along it
+    EXPECT_EQ(f.nodes.f[0][low], 4);  // a smooth wall does not hold what slides along it
 }
 
 /// Reactions are those of the soil's forces: damping has no part in them.
@@ -105,16 +105,16 @@ TEST(Wall, ReactionBeforeDamping)
 {
     Fixture f("[damping]\nlocal = 0.8\n[[boundary]]\nname = \"base\"\nwhere = \"y <= 0\"\nfix = \"xy\"\n");
     f.ops.begin_step({0, 0.1, 0.1});
-    const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 0)), free = static_cast<std::uint32_t>(f.lattice.node(3, 2));
+    const auto n = static_cast<std::uint32_t>(f.lattice.node({3, 0})), free = static_cast<std::uint32_t>(f.lattice.node({3, 2}));
     f.nodes.set_active({n, free});
-    f.nodes.fy[n] = -5;
-    f.nodes.fx[n] = 2;
-    f.nodes.vy[n] = f.nodes.vy[free] = 1;
-    f.nodes.fy[free] = 10;
+    f.nodes.f[1][n] = -5;
+    f.nodes.f[0][n] = 2;
+    f.nodes.v[1][n] = f.nodes.v[1][free] = 1;
+    f.nodes.f[1][free] = 10;
     f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
-    EXPECT_EQ(f.ops.records()[0].reaction, (Vec2{-2, 5}));
-    EXPECT_EQ(f.nodes.fy[n], 0);
-    EXPECT_DOUBLE_EQ(f.nodes.fy[free], 2);
+    EXPECT_EQ(f.ops.records()[0].reaction, (Vec<2>{-2, 5}));
+    EXPECT_EQ(f.nodes.f[1][n], 0);
+    EXPECT_DOUBLE_EQ(f.nodes.f[1][free], 2);
     EXPECT_FALSE(f.ops.records()[0].displacement.has_value());
 }
 
@@ -123,16 +123,16 @@ TEST(Wall, DampingDoesNotMoveTheFace)
 {
     Fixture f("[damping]\nlocal = 0.8\n[[wall]]\nname = \"floor\"\nmin = [0.0, 0.2]\nmax = [4.0, 0.2]\nmotion = \"smooth\"\nfix = \"y\"\n");
     f.ops.begin_step({0, 0.1, 0.1});
-    const auto low = static_cast<std::uint32_t>(f.lattice.node(3, 0)), high = static_cast<std::uint32_t>(f.lattice.node(3, 1));
+    const auto low = static_cast<std::uint32_t>(f.lattice.node({3, 0})), high = static_cast<std::uint32_t>(f.lattice.node({3, 1}));
     f.nodes.set_active({low, high});
     f.nodes.mass[low] = 3;
-    f.nodes.fy[low] = -5;
-    f.nodes.fy[high] = -7;
-    f.nodes.vy[low] = 0.4;
-    f.nodes.vy[high] = 0.6;
+    f.nodes.f[1][low] = -5;
+    f.nodes.f[1][high] = -7;
+    f.nodes.v[1][low] = 0.4;
+    f.nodes.v[1][high] = 0.6;
     f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
-    EXPECT_NEAR(0.6 * f.nodes.fy[low] / 3 + 0.4 * f.nodes.fy[high] / 2, 0, 1e-12);
-    EXPECT_GT(std::abs(f.nodes.fy[low]), 1e-3);  // the pair may still turn about the face
+    EXPECT_NEAR(0.6 * f.nodes.f[1][low] / 3 + 0.4 * f.nodes.f[1][high] / 2, 0, 1e-12);
+    EXPECT_GT(std::abs(f.nodes.f[1][low]), 1e-3);  // the pair may still turn about the face
 }
 
 /// A travel of exactly one cell hands off, up and down, whatever the rounding of its sum.
@@ -157,9 +157,9 @@ TEST(Wall, HandsOffAtExactlyOneCell)
 TEST(Wall, AGapPassesNothingOn)
 {
     Fixture f(cap("smooth"));
-    for (int j = 6; j <= f.lattice.ny; ++j)
-        for (int i = 0; i <= f.lattice.nx; ++i)
-            f.nodes.mass[f.lattice.node(i, j)] = 0;
+    for (int j = 6; j <= f.lattice.size[1]; ++j)
+        for (int i = 0; i <= f.lattice.size[0]; ++i)
+            f.nodes.mass[f.lattice.node({i, j})] = 0;
     f.step(0, 0.1);
     f.ops.begin_step({0.1, 0.1, 0.1});  // the lower face is at y = 2.8, between a node with mass and one without
     EXPECT_EQ(f.column(3)[5], 1);
@@ -180,17 +180,17 @@ TEST(Wall, PullsSoilWhoseMassDoesNotReachTheNextNode)
         Fixture f("[[wall]]\nname = \"cap\"\nmin = [0.0, 2.0]\nmax = [4.0, 2.0]\nvelocity = [\"0\", \"" + std::to_string(speed) +
                       "*(t < 0.2)\"]\nmotion = \"smooth\"\nfix = \"y\"\n",
                   method);
-        for (int j = 5; j <= f.lattice.ny; ++j)
-            for (int i = 0; i <= f.lattice.nx; ++i)
-                f.nodes.mass[f.lattice.node(i, j)] = 0;
+        for (int j = 5; j <= f.lattice.size[1]; ++j)
+            for (int i = 0; i <= f.lattice.size[0]; ++i)
+                f.nodes.mass[f.lattice.node({i, j})] = 0;
         f.step(0, 0.05);
         f.ops.begin_step(
             {0.05, 0.05, 0.05});  // the face is at y = 2 + travel; points are 0.125 m apart, and the highest nodes with mass at y = 2
         EXPECT_EQ(f.column(3)[4], follows ? speed : 1.0) << method << " " << travel;
-        const std::size_t n = f.lattice.node(3, 4);
-        f.nodes.fy[n] = -5;
+        const std::size_t n = f.lattice.node({3, 4});
+        f.nodes.f[1][n] = -5;
         f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
-        EXPECT_EQ(f.nodes.fy[n], follows ? 0.0 : -5.0) << method << " " << travel;
+        EXPECT_EQ(f.nodes.f[1][n], follows ? 0.0 : -5.0) << method << " " << travel;
         EXPECT_EQ(f.ops.records()[0].reaction[1], follows ? 5.0 : 0.0) << method << " " << travel;
     }
 }
@@ -200,11 +200,11 @@ TEST(Wall, OwnsWhatItDrives)
 {
     Fixture f("[[boundary]]\nname = \"top\"\nwhere = \"y >= 3\"\nfix = \"y\"\n" + cap("hand_off"));
     f.ops.begin_step({0, 0.1, 0.1});
-    const auto n = static_cast<std::uint32_t>(f.lattice.node(3, 6));
+    const auto n = static_cast<std::uint32_t>(f.lattice.node({3, 6}));
     f.nodes.set_active({n});
     for (int n_steps = 0; n_steps < 2; ++n_steps)  // reactions are those of the step
     {
-        f.nodes.fy[n] = 5;
+        f.nodes.f[1][n] = 5;
         f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
         EXPECT_EQ(f.ops.records()[0].reaction[1], 0);
         EXPECT_EQ(f.ops.records()[1].reaction[1], -5);
@@ -219,7 +219,7 @@ TEST(Wall, LaterOnesDriveTheNodesWithin)
     const std::string plate = "[[wall]]\nname = \"plate\"\nmin = [0.0, 3.0]\nmax = [4.0, 3.0]\nfix = \"y\"\n";
     Fixture f(block + plate);
     f.ops.begin_step({0, 0.1, 0.1});
-    f.nodes.fy[f.lattice.node(3, 6)] = 5;
+    f.nodes.f[1][f.lattice.node({3, 6})] = 5;
     f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
     EXPECT_EQ(f.ops.records()[0].reaction[1], 0);
     EXPECT_EQ(f.ops.records()[1].reaction[1], -5);
@@ -247,9 +247,9 @@ TEST(Wall, LaterOnesDriveTheNodesOfAFace)
         }
         else
             EXPECT_NEAR(0.4 * v[5] + 0.6 * v[6], -2, 1e-12);
-        const std::size_t low = f.lattice.node(3, 5), high = f.lattice.node(3, 6);
-        f.nodes.fy[low] = -5;
-        f.nodes.fy[high] = -7;
+        const std::size_t low = f.lattice.node({3, 5}), high = f.lattice.node({3, 6});
+        f.nodes.f[1][low] = -5;
+        f.nodes.f[1][high] = -7;
         f.ops.apply_forces(f.lattice, f.nodes, {0, 0.1, 0.1});
         const std::size_t first = smooth_first ? 0 : 1;
         EXPECT_NEAR(f.ops.records()[1 - first].reaction[1], 7, 1e-12);           // all of the node's force
@@ -271,10 +271,11 @@ TEST(Wall, DoorOpensWhenToldTo)
     Fixture f("[[wall]]\nname = \"floor\"\nmin = [0.0, 0.0]\nmax = [4.0, 0.0]\ndoor = [1.0, 2.5]\ndoor_opens = 0.5\n");
     const auto row = [&]
     {
-        std::vector<double> vx(f.nodes.vx.size(), 1), vy(f.nodes.vy.size(), 1), values;
-        f.ops.restrain(f.lattice, f.nodes, vx, vy);
-        for (int i = 0; i <= f.lattice.nx; ++i)
-            values.push_back(vy[f.lattice.node(i, 0)]);
+        VectorField<2> v{std::vector<double>(f.nodes.mass.size(), 1), std::vector<double>(f.nodes.mass.size(), 1)};
+        std::vector<double> values;
+        f.ops.restrain(f.lattice, f.nodes, v);
+        for (int i = 0; i <= f.lattice.size[0]; ++i)
+            values.push_back(v[1][f.lattice.node({i, 0})]);
         return values;
     };
     f.ops.begin_step({0.4, 0.1, 0.1});
@@ -290,11 +291,11 @@ TEST(Wall, TakesItsDoorAlong)
         "[[wall]]\nname = \"gate\"\nmin = [2.0, 0.5]\nmax = [2.0, 3.0]\ndoor = [1.0, 2.0]\nvelocity = [\"0\", \"t < 0.12 ? 5 : 0\"]\n");
     const auto held = [&]
     {
-        std::vector<double> vx(f.nodes.vx.size(), 1), vy(f.nodes.vy.size(), 1);
-        f.ops.restrain(f.lattice, f.nodes, vx, vy);
+        VectorField<2> v{std::vector<double>(f.nodes.mass.size(), 1), std::vector<double>(f.nodes.mass.size(), 1)};
+        f.ops.restrain(f.lattice, f.nodes, v);
         std::string row;
-        for (int j = 0; j <= f.lattice.ny; ++j)
-            row += vx[f.lattice.node(4, j)] == 0 ? '#' : '.';
+        for (int j = 0; j <= f.lattice.size[1]; ++j)
+            row += v[0][f.lattice.node({4, j})] == 0 ? '#' : '.';
         return row;
     };
     f.ops.begin_step({0, 0.1, 0.1});
@@ -309,11 +310,11 @@ TEST(Wall, TakesTheRingAroundTheLattice)
 {
     Fixture f("[[wall]]\nname = \"left\"\nmin = [0.0, 0.0]\nmax = [0.0, 4.0]\n");
     f.ops.begin_step({0, 0.1, 0.1});
-    std::vector<double> vx(f.nodes.vx.size(), 1), vy(f.nodes.vy.size(), 1);
-    f.ops.restrain(f.lattice, f.nodes, vx, vy);
-    for (int j = -1; j <= f.lattice.ny + 1; ++j)
+    VectorField<2> v{std::vector<double>(f.nodes.mass.size(), 1), std::vector<double>(f.nodes.mass.size(), 1)};
+    f.ops.restrain(f.lattice, f.nodes, v);
+    for (int j = -1; j <= f.lattice.size[1] + 1; ++j)
         for (int i = -1; i <= 1; ++i)
-            EXPECT_EQ(vx[f.lattice.node(i, j)], i < 1 ? 0 : 1) << i << " " << j;
+            EXPECT_EQ(v[0][f.lattice.node({i, j})], i < 1 ? 0 : 1) << i << " " << j;
 }
 
 /// A wall that is smooth in one direction is not stopped by what holds that direction.

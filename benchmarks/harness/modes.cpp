@@ -43,7 +43,7 @@ Findings find(const ModesOptions& options, const Scene& scene, Solver& solver)
         throw SceneError(fmt::format("{}: the state has {} unknowns, and the modes of at most {} are computed: take a smaller body, larger "
                                      "cells (--set grid.cell_size=...) or fewer points per cell",
                                      scene.path, n, most_unknowns));
-    const Lattice lattice = make_lattice(scene.grid);
+    const Lattice<2> lattice = make_lattice(scene.grid);
     const auto map_of = [&](double dt)
     { return one_step_map(solver, f.start.state, lattice, {.t = f.start.t, .dt = dt, .steps = options.steps}); };
     f.map = map_of(f.start.dt);

@@ -72,6 +72,15 @@ TESTBED_INLINE inline void unrolled(F&& f)
     (std::make_index_sequence<N>{});
 }
 
+/// f(0) + f(1) + ... + f(N-1).
+template <std::size_t N, class F>
+TESTBED_INLINE inline auto total(F&& f)
+{
+    auto sum = f(std::integral_constant<std::size_t, 0>{});
+    unrolled<N - 1>([&](auto k) TESTBED_INLINE { sum += f(std::integral_constant<std::size_t, k + 1>{}); });
+    return sum;
+}
+
 /// Sets packs to zero one by one: a value-initialised array of them becomes a string instruction.
 template <std::size_t N>
 TESTBED_INLINE inline void set_zero(std::array<Pack, N>& packs)

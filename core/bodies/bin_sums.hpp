@@ -9,16 +9,16 @@ namespace testbed
 /// Sums of the points of one bin, where they are now, and whether one of them left it: the sums are then not right. A loop of its own: with
 /// the sums of several cells or nodes beside what else a pass computes, the registers would not do, and the points of a bin are still in
 /// the nearest cache.
-template <class Support, class Sums>
-TESTBED_INLINE inline bool sum_bin(const Lattice& lattice, const Body& body, const Bin& bin, double* to)
+template <class Support, class Sums, int dim>
+TESTBED_INLINE inline bool sum_bin(const Lattice<dim>& lattice, const Body& body, const Bin<dim>& bin, double* to)
 {
-    const BinFrame frame(lattice, bin);
+    const BinFrame<dim> frame(lattice, bin);
     Sums sums(lattice, bin);
     Mask left(false);
     for_each_pack(bin.begin, bin.end,
                   [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                   {
-                      const Corner c = frame.template corner<Support>(body.points, p, lanes);
+                      const Corner<dim> c = frame.template corner<Support>(body.points, p, lanes);
                       left |= frame.template left<Support>(body.points, p, lanes, c);
                       sums.add(body, p, lanes, c);
                   });
@@ -37,7 +37,7 @@ public:
     const std::vector<double>& all() const { return sums_; }
 
     /// Sums bins that points left or entered.
-    void update_changed(const Lattice& lattice, const std::vector<Body>& bodies)
+    void update_changed(const Lattice<Body::dim>& lattice, const std::vector<Body>& bodies)
     {
         std::size_t first = 0;
         for (const Body& body : bodies)
@@ -52,7 +52,7 @@ public:
         }
     }
     /// The same if the lists of bins are others than before: takes over the sums of bins that kept their points; none the first time.
-    void update(const Lattice& lattice, const std::vector<Body>& bodies)
+    void update(const Lattice<Body::dim>& lattice, const std::vector<Body>& bodies)
     {
         std::size_t bins = 0;
         for (const Body& body : bodies)

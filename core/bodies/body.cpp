@@ -29,14 +29,14 @@ public:
     ParameterReader(const Scene& scene, const MaterialSpec& material) : scene_(scene), material_(material) {}
 
     /// Values of a parameter at the points, one if the text is a number. @throws SceneError where it is not valid
-    std::vector<double> read(const char* key, const std::string& text, const std::vector<Vec2>& positions, bool everywhere, auto&& is_valid,
-                             const char* rule) const
+    std::vector<double> read(const char* key, const std::string& text, const std::vector<Vec<2>>& positions, bool everywhere,
+                             auto&& is_valid, const char* rule) const
     {
         const Expression expression(text, scene_.expression_constants());
         std::vector<double> values(everywhere || !is_number(text) ? positions.size() : 1);
         for (std::size_t p = 0; p < values.size(); ++p)
         {
-            const Vec2& X = positions[p];
+            const Vec<2>& X = positions[p];
             values[p] = expression({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
             if (!std::isfinite(values[p]) || !is_valid(values[p]))
                 throw SceneError(fmt::format("{}: material '{}': {} = {} at ({}, {}) m, {}", scene_.path, material_.name, key, values[p],
@@ -50,8 +50,8 @@ private:
     const MaterialSpec& material_;
 };
 
-PointParameters read_parameters(const Scene& scene, const BodySpec& body, const MaterialSpec& material, const std::vector<Vec2>& positions,
-                                std::uint32_t first_id)
+PointParameters read_parameters(const Scene& scene, const BodySpec& body, const MaterialSpec& material,
+                                const std::vector<Vec<2>>& positions, std::uint32_t first_id)
 {
     const ParameterReader reader(scene, material);
     PointParameters out;
@@ -79,19 +79,19 @@ PointParameters read_parameters(const Scene& scene, const BodySpec& body, const 
     return out;
 }
 
-void set_initial_stress(const std::array<std::string, 4>& text, const Constants& constants, Points& q)
+void set_initial_stress(const std::array<std::string, 4>& text, const Constants& constants, Points<2>& q)
 {
     std::vector<Expression> stress;
     for (const std::string& component : text)
         stress.emplace_back(component, constants);
     for (std::size_t p = 0; p < q.count; ++p)
     {
-        const Place here{.X = q.x[p], .Y = q.y[p], .x = q.x[p], .y = q.y[p]};
-        q.sxx[p] = stress[0].finite(here);
-        q.syy[p] = stress[1].finite(here);
+        const Place here{.X = q.x[0][p], .Y = q.x[1][p], .x = q.x[0][p], .y = q.x[1][p]};
+        q.stress[0][p] = stress[0].finite(here);
+        q.stress[1][p] = stress[1].finite(here);
         if (q.szz.active())
             q.szz[p] = stress[2].finite(here);
-        q.sxy[p] = stress[3].finite(here);
+        q.stress[2][p] = stress[3].finite(here);
     }
 }
 
@@ -106,7 +106,7 @@ MaterialSpec needed_material(const Scene& scene, const BodySpec& spec, PointNeed
 
 /// A body without points yet; its law has the largest stiffness of them.
 Body empty_body(const Scene& scene, const BodySpec& spec, const MaterialSpec& material, const PointParameters& parameters,
-                const Lattice& lattice)
+                const Lattice<2>& lattice)
 {
     const Varying varying = parameters.varying();
     const Strength<> strength = material.has_strength() && !varying.strength
@@ -123,50 +123,41 @@ Body empty_body(const Scene& scene, const BodySpec& spec, const MaterialSpec& ma
 /// Room for the fields of n squares of side h.
 void allocate(Body& body, std::size_t n, double h, double density, PointNeeds needs)
 {
-    Points& q = body.points;
+    Points<2>& q = body.points;
     q.count = n;
     q.initial_volume = h * h;
     q.mass = density * h * h;
-    for (Field<double>* field : {&q.x, &q.y, &q.sxx, &q.syy, &q.sxy})
-        field->activate(n);
-    if (needs.initial_position)
+    const auto activate = [&](auto& fields, double value = 0)
     {
-        q.X.activate(n);
-        q.Y.activate(n);
-    }
+        for (Field<double>& field : fields)
+            field.activate(n, value);
+    };
+    activate(q.x);
+    activate(q.stress);
+    if (needs.initial_position)
+        activate(q.X);
     q.id.activate(n);
     if (needs.box)
-    {
-        q.half_x.activate(n, h / 2);
-        q.half_y.activate(n, h / 2);
-    }
+        activate(q.half_width, h / 2);
     else
         q.volume.activate(n, h * h);
     if (needs.velocity)
-    {
-        q.vx.activate(n);
-        q.vy.activate(n);
-    }
+        activate(q.v);
     std::visit([&](const auto& law) { law.allocate(q); }, body.material);
 }
 
-void set_positions(const std::vector<Vec2>& positions, std::uint32_t first_id, Points& q)
+void set_positions(const std::vector<Vec<2>>& positions, std::uint32_t first_id, Points<2>& q)
 {
     for (std::size_t p = 0; p < q.count; ++p)
     {
-        const Vec2& X = positions[p];
-        q.x[p] = X[0];
-        q.y[p] = X[1];
-        if (q.X.active())
-        {
-            q.X[p] = X[0];
-            q.Y[p] = X[1];
-        }
+        set(q.x, p, positions[p]);
+        if (q.X[0].active())
+            set(q.X, p, positions[p]);
         q.id[p] = first_id + static_cast<std::uint32_t>(p);
     }
 }
 
-void set_parameters(const PointParameters& parameters, Points& q)
+void set_parameters(const PointParameters& parameters, Points<2>& q)
 {
     const Varying varying = parameters.varying();
     const double largest = parameters.largest_stiffness();
@@ -182,40 +173,38 @@ void set_parameters(const PointParameters& parameters, Points& q)
     }
 }
 
-void set_velocity(const Expr2& text, const Constants& constants, Points& q)
+void set_velocity(const Expr2& text, const Constants& constants, Points<2>& q)
 {
     const VectorExpression velocity(text, constants);
     for (std::size_t p = 0; p < q.count; ++p)
-    {
-        const Vec2 v = velocity({.X = q.x[p], .Y = q.y[p], .x = q.x[p], .y = q.y[p]});
-        q.vx[p] = v[0];
-        q.vy[p] = v[1];
-    }
+        set(q.v, p, velocity({.X = q.x[0][p], .Y = q.x[1][p], .x = q.x[0][p], .y = q.x[1][p]}));
 }
 
 }  // namespace
 
-Lattice make_lattice(const GridSpec& grid)
+Lattice<2> make_lattice(const GridSpec& grid)
 {
-    return {grid.origin, grid.cell_size, static_cast<int>(std::lround(grid.size[0] / grid.cell_size)),
-            static_cast<int>(std::lround(grid.size[1] / grid.cell_size))};
+    Index<2> cells;
+    for (std::size_t d = 0; d < cells.size(); ++d)
+        cells[d] = static_cast<int>(std::lround(grid.size[d] / grid.cell_size));
+    return {grid.origin, grid.cell_size, cells};
 }
 
-std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointNeeds needs)
+std::vector<Body> make_bodies(const Scene& scene, const Lattice<2>& lattice, PointNeeds needs)
 {
     const Constants constants = scene.expression_constants();
     std::vector<Body> bodies;
     std::uint32_t next_id = 0;
     for (const BodySpec& spec : scene.bodies)
     {
-        const std::vector<Vec2> positions = fill(scene, spec);
+        const std::vector<Vec<2>> positions = fill(scene, spec);
         if (positions.empty())
             throw SceneError(
                 fmt::format("{}: body '{}' has no points; it is smaller than the spacing of its points", scene.path, spec.name));
         const MaterialSpec material = needed_material(scene, spec, needs);
         const PointParameters parameters = read_parameters(scene, spec, material, positions, next_id);
         bodies.push_back(empty_body(scene, spec, material, parameters, lattice));
-        Points& q = bodies.back().points;
+        Points<2>& q = bodies.back().points;
         allocate(bodies.back(), positions.size(), spacing(spec, scene.grid), material.density, needs);
         set_positions(positions, next_id, q);
         next_id += static_cast<std::uint32_t>(q.count);

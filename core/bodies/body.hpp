@@ -11,10 +11,11 @@ namespace testbed
 {
 struct Body
 {
+    static constexpr int dim = 2;
     std::string name;
-    Points points;
+    Points<dim> points;
     Material material;
-    Bins bins;
+    Bins<dim> bins;
     double confinement = 0;      ///< pressure on free surfaces: forces come from the stress beyond it [Pa]
     double truncated_share = 0;  ///< of the random strengths drawn
     double counted_volume = std::numeric_limits<double>::infinity();  ///< most of a point over which its stress counts [m^2]
@@ -33,11 +34,11 @@ struct Body
 
 /// What makes forces at the points [p, p + lanes) [Pa]: their stress beyond the confining pressure. The one place that puts it together.
 template <class Lanes>
-TESTBED_INLINE inline SymTensor<Pack> total_stress(const Body& body, std::size_t p, const Lanes& lanes)
+TESTBED_INLINE inline SymTensor<Body::dim, Pack> total_stress(const Body& body, std::size_t p, const Lanes& lanes)
 {
-    const Points& q = body.points;
-    const Pack pressure(body.confinement);
-    return {lanes.load(&q.sxx[p]) + pressure, lanes.load(&q.syy[p]) + pressure, lanes.load(&q.sxy[p])};
+    SymTensor<Body::dim, Pack> s = body.points.stress_at(p, lanes);
+    unrolled<Body::dim>([&](auto d) TESTBED_INLINE { component<d, d>(s) += Pack(body.confinement); });
+    return s;
 }
 
 /// What a method asks of each point beyond position and stress.
@@ -56,11 +57,11 @@ struct PointNeeds
     }
 };
 
-Lattice make_lattice(const GridSpec& grid);
+Lattice<2> make_lattice(const GridSpec& grid);
 
 /// The bodies of a scene with their initial velocity if the method keeps it on the points.
 /// @throws SceneError when a body has no points or a material parameter is out of range at a point
-std::vector<Body> make_bodies(const Scene& scene, const Lattice& lattice, PointNeeds needs);
+std::vector<Body> make_bodies(const Scene& scene, const Lattice<2>& lattice, PointNeeds needs);
 
 /// Bytes of the arrays of all points and of their order.
 inline std::size_t bytes_of(const std::vector<Body>& bodies)

@@ -36,9 +36,9 @@ public:
             others |= body.bins.template rebuild<Support>(body.points, workspace);
         return others;
     }
-    std::vector<const Bins*> bins() const
+    std::vector<const Bins<2>*> bins() const
     {
-        std::vector<const Bins*> list;
+        std::vector<const Bins<2>*> list;
         for (const Body& body : bodies)
             list.push_back(&body.bins);
         return list;
@@ -61,7 +61,7 @@ public:
 
     /// kernel(body, bin, number of the bin among all, frame) for every bin of every body.
     template <class Kernel>
-    void for_each_bin(const Lattice& lattice, Kernel&& kernel)
+    void for_each_bin(const Lattice<2>& lattice, Kernel&& kernel)
     {
         std::size_t first_bin = 0;
         for (Body& body : bodies)
@@ -72,7 +72,7 @@ public:
     }
     /// The same with the law of the body: kernel(body, law, bin, number, frame).
     template <class Kernel>
-    void for_each_bin_with_law(const Lattice& lattice, Kernel&& kernel)
+    void for_each_bin_with_law(const Lattice<2>& lattice, Kernel&& kernel)
     {
         std::size_t first_bin = 0;
         for (Body& body : bodies)
@@ -81,7 +81,7 @@ public:
                 [&](const auto& law)
                 {
                     for_each_bin_of(lattice, body, first_bin,
-                                    [&](Body& b, const Bin& bin, std::size_t number, const BinFrame& frame) TESTBED_INLINE
+                                    [&](Body& b, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_INLINE
                                     { kernel(b, law, bin, number, frame); });
                 },
                 body.material);
@@ -103,7 +103,7 @@ public:
 
 private:
     template <class Kernel>
-    void for_each_bin_of(const Lattice& lattice, Body& body, std::size_t first_bin, Kernel&& kernel)
+    void for_each_bin_of(const Lattice<2>& lattice, Body& body, std::size_t first_bin, Kernel&& kernel)
     {
         const auto& bins = body.bins.list();
         parallel_for(bins.size(), [&](std::size_t b) { kernel(body, bins[b], first_bin + b, BinFrame(lattice, bins[b])); });

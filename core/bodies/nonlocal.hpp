@@ -27,15 +27,15 @@ public:
     void resize(std::size_t stride, std::size_t entities);
 
     /// Sets the softening strain of all points whose law asks for it, from their plastic shear strain.
-    /// @param index (i, j) -> number of the cell or node
+    /// @param index Index<2> -> number of the cell or node
     template <class Support, class Index>
-    void apply(const Lattice& lattice, std::vector<Body>& bodies, const Gather& gather, Index&& index)
+    void apply(const Lattice<2>& lattice, std::vector<Body>& bodies, const Gather& gather, Index&& index)
     {
         partial_.assign(gather.blocks() * 2, 0.0);
         std::size_t first_bin = 0;
         for (std::size_t b = 0; b < bodies.size(); ++b)
         {
-            const Points& q = bodies[b].points;
+            const Points<2>& q = bodies[b].points;
             if (over_nonlocal_[b] > 0)
                 spread<Support, 2>(lattice, bodies[b], first_bin, partial_,
                                    [&](std::size_t p, const auto& lanes)
@@ -50,7 +50,7 @@ public:
         for (std::size_t b = 0; b < bodies.size(); ++b)
             if (over_nonlocal_[b] > 0)
             {
-                Points& q = bodies[b].points;
+                Points<2>& q = bodies[b].points;
                 const Pack m(over_nonlocal_[b]);
                 interpolate<Support>(lattice, bodies[b], mean_, index,
                                      [&](std::size_t p, const auto& lanes, Pack mean)

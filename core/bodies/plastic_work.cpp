@@ -19,7 +19,7 @@ double PlasticWork::add(const std::vector<Body>& bodies)
 {
     for (const Body& body : bodies)
     {
-        const Points& q = body.points;
+        const Points<2>& q = body.points;
         if (!q.plastic_shear.active())
             continue;
         for (std::size_t p = 0; p < q.count; ++p)

@@ -29,20 +29,20 @@ double strain_energy(const std::vector<Body>& bodies)
     return total;
 }
 
-PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice)
+PointSums point_sums(const std::vector<Body>& bodies, const Lattice<2>& lattice)
 {
     PointSums total;
-    const Vec2 low = lattice.origin, high{low[0] + lattice.nx * lattice.cell_size, low[1] + lattice.ny * lattice.cell_size};
+    const Vec<2> low = lattice.origin, high{low[0] + lattice.size[0] * lattice.cell_size, low[1] + lattice.size[1] * lattice.cell_size};
     for (const Body& body : bodies)
     {
-        const Points& q = body.points;
+        const Points<2>& q = body.points;
         const double initial = 1 / q.initial_volume, mass = q.mass * q.weight_share;
         const auto of_point = [&](const auto& law, std::size_t p)
         {
             const double volume = q.current_volume(p), energy = strain_energy(law, q, p);
-            const bool inside = q.x[p] >= low[0] && q.x[p] <= high[0] && q.y[p] >= low[1] && q.y[p] <= high[1];
+            const bool inside = q.x[0][p] >= low[0] && q.x[0][p] <= high[0] && q.x[1][p] >= low[1] && q.x[1][p] <= high[1];
             return std::array<double, 6>{
-                energy, energy * work_over_energy(volume * initial), volume, mass * q.x[p], mass * q.y[p], inside ? 0.0 : 1.0};
+                energy, energy * work_over_energy(volume * initial), volume, mass * q.x[0][p], mass * q.x[1][p], inside ? 0.0 : 1.0};
         };
         const auto s = std::visit([&](const auto& law) { return ordered_sum<6>(q.count, [&](std::size_t p) { return of_point(law, p); }); },
                                   body.material);
@@ -54,10 +54,11 @@ PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice)
         total.moment[1] += s[4];
         total.outside += s[5];
         const auto largest = [&](auto&& f) { return parallel_max(q.count, f); };
-        total.max_stress = std::max(total.max_stress, largest(
-                                                          [&](std::size_t p) {
-                                                              return std::max({std::abs(q.sxx[p]), std::abs(q.syy[p]), std::abs(q.sxy[p])});
-                                                          }));
+        total.max_stress = std::max(total.max_stress,
+                                    largest(
+                                        [&](std::size_t p) {
+                                            return std::max({std::abs(q.stress[0][p]), std::abs(q.stress[1][p]), std::abs(q.stress[2][p])});
+                                        }));
         total.largest = std::max(total.largest, initial * largest([&](std::size_t p) { return q.current_volume(p); }));
         const double denser = largest([&](std::size_t p) { return 1 / q.current_volume(p); });
         total.smallest = std::min(total.smallest, initial / denser);

@@ -14,14 +14,14 @@ struct PointSums
     double max_stress = 0;     ///< largest component in the plane [Pa]
     double volume = 0;         ///< [m^2]
     double mass = 0;           ///< that has weight [kg/m]
-    Vec2 moment{0, 0};         ///< sum of it times x [kg]
+    Vec<2> moment{0, 0};       ///< sum of it times x [kg]
     double smallest = std::numeric_limits<double>::infinity(), largest = 0;  ///< current over initial volume
     double outside = 0;                                                      ///< points that are not on the lattice
 };
 
 /// Energy of the stress of all points on their current volume [J/m].
 double strain_energy(const std::vector<Body>& bodies);
-PointSums point_sums(const std::vector<Body>& bodies, const Lattice& lattice);
+PointSums point_sums(const std::vector<Body>& bodies, const Lattice<2>& lattice);
 
 /// Work that brought a point to its stress over the energy of the stress on the current volume. The laws add up increments of stress, so
 /// that stress is proportional to the logarithmic strain, and the volume grows on the way: along a straight path to the volume ratio e^a

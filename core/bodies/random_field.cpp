@@ -27,7 +27,7 @@ double standard_normal(std::uint64_t seed, std::uint64_t stream, std::uint64_t c
     return std::sqrt(-2 * std::log(uniform(key))) * std::cos(2 * std::numbers::pi * uniform(~key));
 }
 
-double CorrelatedField::operator()(const Vec2& X) const
+double CorrelatedField::operator()(const Vec<2>& X) const
 {
     const double spacing = 0.5 * theta_;
     constexpr int reach = 5;  // weights beyond are below 2e-5
@@ -45,7 +45,7 @@ double CorrelatedField::operator()(const Vec2& X) const
     return sum / std::sqrt(squares);
 }
 
-double RandomStrength::deviate(std::uint64_t stream, const Vec2& X, std::uint32_t id) const
+double RandomStrength::deviate(std::uint64_t stream, const Vec<2>& X, std::uint32_t id) const
 {
     const auto seed = static_cast<std::uint64_t>(spec_.seed);
     if (spec_.correlation_length)
@@ -63,7 +63,7 @@ void RandomStrength::scale(double& value, double deviation, double z, double lea
     truncated_ += value != drawn;
 }
 
-void RandomStrength::draw(const Vec2& X, std::uint32_t id, double& cohesion, double& friction)
+void RandomStrength::draw(const Vec<2>& X, std::uint32_t id, double& cohesion, double& friction)
 {
     scale(cohesion, spec_.cohesion_deviation, deviate(0, X, id), 0, std::numeric_limits<double>::infinity());
     scale(friction, spec_.friction_deviation, deviate(1, X, id), least_, largest_random_friction);

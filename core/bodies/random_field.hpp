@@ -18,7 +18,7 @@ class CorrelatedField
 {
 public:
     CorrelatedField(std::uint64_t seed, std::uint64_t stream, double theta) : seed_(seed), stream_(stream), theta_(theta) {}
-    double operator()(const Vec2& X) const;
+    double operator()(const Vec<2>& X) const;
 
 private:
     std::uint64_t seed_, stream_;
@@ -35,12 +35,12 @@ public:
     RandomStrength(const RandomSpec& spec, double least) : spec_(spec), least_(least) {}
 
     /// @param cohesion [Pa] @param friction [rad]: means, replaced by the drawn values @param id of the point
-    void draw(const Vec2& X, std::uint32_t id, double& cohesion, double& friction);
+    void draw(const Vec<2>& X, std::uint32_t id, double& cohesion, double& friction);
     /// Share of the values drawn that were cut to [0, infinity) or [dilatancy angle, 80 degrees].
     double truncated_share() const { return drawn_ > 0 ? static_cast<double>(truncated_) / static_cast<double>(drawn_) : 0; }
 
 private:
-    double deviate(std::uint64_t stream, const Vec2& X, std::uint32_t id) const;
+    double deviate(std::uint64_t stream, const Vec<2>& X, std::uint32_t id) const;
     void scale(double& value, double deviation, double z, double least, double largest);
 
     RandomSpec spec_;

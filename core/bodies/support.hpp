@@ -1,5 +1,5 @@
 #pragma once
-/// The support of a point: which S x S cells or nodes it touches, and with which weights. In each direction the support begins
+/// The support of a point: which S x S (x S) cells or nodes it touches, and with which weights. In each direction the support begins
 /// at `a` = (corner - bin) / L in [0, 1); a point with a box has `width` = box / L <= 1, others have none, but all the same
 /// `half_width` [cells] between the corner and the point.
 
@@ -43,108 +43,144 @@ struct DomainSupport
 };
 
 /// Where the supports of a pack of points begin in their bin, and how wide they are [cells].
+template <int dim>
 struct Corner
 {
-    Pack ax, ay, wx, wy;
+    Vec<dim, Pack> a, width;
 };
 
-/// 1 over both widths by one division: divisions cost as much as all else.
-TESTBED_INLINE inline std::array<Pack, 2> inverse_widths(const Corner& c)
+/// 1 over each width by one division: divisions cost as much as all else.
+template <int dim>
+TESTBED_INLINE inline Vec<dim, Pack> inverse_widths(const Corner<dim>& c)
 {
-    const Pack inverse = Pack(1.0) / (c.wx * c.wy);
-    return {inverse * c.wy, inverse * c.wx};
+    Pack all = c.width[0];
+    unrolled<dim - 1>([&](auto d) TESTBED_INLINE { all *= c.width[d + 1]; });
+    const Pack inverse = Pack(1.0) / all;
+    Vec<dim, Pack> one_by_one;
+    unrolled<dim>(
+        [&](auto d) TESTBED_INLINE
+        {
+            one_by_one[d] = inverse;
+            unrolled<dim>(
+                [&](auto other) TESTBED_INLINE
+                {
+                    if constexpr (other != d)
+                        one_by_one[d] *= c.width[other];
+                });
+        });
+    return one_by_one;
 }
 
-/// Weights in both directions.
-template <class Support>
+/// The product of one factor per direction, those of block k of S^dim, row by row.
+template <int S, std::size_t k, class T, std::size_t dim>
+TESTBED_INLINE inline T block_product(const std::array<std::array<T, S>, dim>& factors)
+{
+    constexpr auto at = block_index<S, dim>(k);
+    T product = factors[0][at[0]];
+    unrolled<dim - 1>([&](auto d) TESTBED_INLINE { product *= factors[d + 1][at[d + 1]]; });
+    return product;
+}
+
+/// Weights in each direction.
+template <class Support, int dim>
 struct Weights
 {
-    std::array<Pack, Support::S> x, y;
+    static constexpr int S = Support::S;
+    std::array<std::array<Pack, S>, dim> along;
 
-    TESTBED_INLINE explicit Weights(const Corner& c) : Weights(c, inverses(c)) {}
-
-private:
-    TESTBED_INLINE Weights(const Corner& c, const std::array<Pack, 2>& inverse)
-        : x(along(c.ax, c.wx, inverse[0])),
-          y(along(c.ay, c.wy, inverse[1]))
-    {
-    }
-    TESTBED_INLINE static std::array<Pack, 2> inverses(const Corner& c)
+    TESTBED_INLINE explicit Weights(const Corner<dim>& c)
     {
         if constexpr (Support::has_box)
-            return inverse_widths(c);
+        {
+            const auto inverse = inverse_widths(c);
+            unrolled<dim>([&](auto d) TESTBED_INLINE { along[d] = Support::weights_by(c.a[d], c.width[d], inverse[d]); });
+        }
         else
-            return {c.wx, c.wy};  // not used
+            unrolled<dim>([&](auto d) TESTBED_INLINE { along[d] = Support::weights(c.a[d], c.width[d]); });
     }
-    TESTBED_INLINE static std::array<Pack, Support::S> along(Pack a, Pack width, Pack inverse)
+    /// Of the cell or node with number k in the bin's block.
+    template <std::size_t k>
+    TESTBED_INLINE Pack of() const
     {
-        if constexpr (Support::has_box)
-            return Support::weights_by(a, width, inverse);
-        else
-            return Support::weights(a, width);
+        return block_product<S, k>(along);
     }
 };
 
 /// The middles of a pack of boxes in their bin, and their half widths [cells]; points without a box have none.
+template <int dim>
 struct Box
 {
-    Pack x, y, hx, hy;
+    Vec<dim, Pack> x, half;
 };
 
 /// Maps points to the coordinates of their bin, from its corner or from another place in it.
+template <int dim>
 struct BinFrame
 {
-    const Lattice& lattice;
-    const Bin& bin;
-    double scale, x0, y0;  ///< 1/L; bin corner, or that place, in cells from the coordinate origin
+    const Lattice<dim>& lattice;
+    const Bin<dim>& bin;
+    double scale;   ///< 1/L
+    Vec<dim> from;  ///< bin corner, or that place, in cells from the coordinate origin
 
-    BinFrame(const Lattice& in, const Bin& of, const Vec2& from = {0, 0})
-        : lattice(in),
-          bin(of),
-          scale(lattice.cells_per_length),
-          x0(lattice.origin[0] * scale + bin.i + from[0]),
-          y0(lattice.origin[1] * scale + bin.j + from[1])
+    BinFrame(const Lattice<dim>& in, const Bin<dim>& of, const Vec<dim>& place = {}) : lattice(in), bin(of), scale(lattice.cells_per_length)
     {
+        for (int d = 0; d < dim; ++d)
+            from[d] = lattice.origin[d] * scale + bin.at[d] + place[d];
     }
 
     template <class Support, class Lanes>
-    TESTBED_INLINE Box box(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    TESTBED_INLINE Box<dim> box(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Vec<dim, Pack>& x) const
     {
-        const Pack cx = x * Pack(scale) - Pack(x0), cy = y * Pack(scale) - Pack(y0);
-        if constexpr (!Support::has_box)
-            return {cx, cy, Pack(0.0), Pack(0.0)};
-        else
-            return {cx, cy, min(lanes.load(&q.half_x[p]) * Pack(scale), Pack(0.5)), min(lanes.load(&q.half_y[p]) * Pack(scale), Pack(0.5))};
+        Box<dim> b;
+        unrolled<dim>(
+            [&](auto d) TESTBED_INLINE
+            {
+                b.x[d] = x[d] * Pack(scale) - Pack(from[d]);
+                if constexpr (Support::has_box)
+                    b.half[d] = min(lanes.load(&q.half_width[d][p]) * Pack(scale), Pack(0.5));
+                else
+                    b.half[d] = Pack(0.0);
+            });
+        return b;
     }
     template <class Support, class Lanes>
-    TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes, Pack x, Pack y) const
+    TESTBED_INLINE Corner<dim> corner(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Vec<dim, Pack>& x) const
     {
-        const Box b = box<Support>(q, p, lanes, x, y);
-        if constexpr (!Support::has_box)
-            return {b.x - Pack(Support::half_width), b.y - Pack(Support::half_width), Pack(0.0), Pack(0.0)};
-        else
-            return {b.x - b.hx, b.y - b.hy, b.hx + b.hx, b.hy + b.hy};
+        const Box<dim> b = box<Support>(q, p, lanes, x);
+        Corner<dim> c;
+        unrolled<dim>(
+            [&](auto d) TESTBED_INLINE
+            {
+                if constexpr (Support::has_box)
+                    c.a[d] = b.x[d] - b.half[d];
+                else
+                    c.a[d] = b.x[d] - Pack(Support::half_width);
+                c.width[d] = b.half[d] + b.half[d];
+            });
+        return c;
     }
     template <class Support, class Lanes>
-    TESTBED_INLINE Corner corner(const Points& q, std::size_t p, const Lanes& lanes) const
+    TESTBED_INLINE Corner<dim> corner(const Points<dim>& q, std::size_t p, const Lanes& lanes) const
     {
-        return corner<Support>(q, p, lanes, lanes.load(&q.x[p]), lanes.load(&q.y[p]));
+        return corner<Support>(q, p, lanes, load(q.x, p, lanes));
     }
     /// Which of the points, with their support at c, may no longer belong to the bin: the support begins in another one, the point has
     /// left the lattice or is turned inside out.
     template <class Support, class Lanes>
-    TESTBED_INLINE Mask left(const Points& q, std::size_t p, const Lanes& lanes, const Corner& c) const
+    TESTBED_INLINE Mask left(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Corner<dim>& c) const
     {
-        Mask in = is_in_bin(c.ax) && is_in_bin(c.ay);
-        if constexpr (Support::has_box)
-            in = in && lanes.load(&q.half_x[p]) > Pack(0.0) && lanes.load(&q.half_y[p]) > Pack(0.0);
-        else
-        {
-            in = in && lanes.load(&q.volume[p]) > Pack(0.0);
-            if constexpr (Support::half_width > 0)  // the edge of the lattice lies in the middle of a bin
-                in = in && is_inside(c.ax + Pack(Support::half_width + bin.i), lattice.nx) &&
-                     is_inside(c.ay + Pack(Support::half_width + bin.j), lattice.ny);
-        }
+        Mask in(true);
+        if constexpr (!Support::has_box)
+            in = lanes.load(&q.volume[p]) > Pack(0.0);
+        unrolled<dim>(
+            [&](auto d) TESTBED_INLINE
+            {
+                in = in && is_in_bin(c.a[d]);
+                if constexpr (Support::has_box)
+                    in = in && lanes.load(&q.half_width[d][p]) > Pack(0.0);
+                else if constexpr (Support::half_width > 0)  // the edge of the lattice lies in the middle of a bin
+                    in = in && is_inside(c.a[d] + Pack(Support::half_width + bin.at[d]), lattice.size[d]);
+            });
         return lanes.keep(!in);
     }
 
@@ -153,84 +189,81 @@ private:
     TESTBED_INLINE static Mask is_inside(Pack v, int n) { return v > Pack(bin_tolerance) && v < Pack(n - bin_tolerance); }
 };
 
-/// Volume of a pack of points [m^2].
-template <class Support, class Lanes>
-TESTBED_INLINE inline Pack volume(const Points& q, std::size_t p, const Lanes& lanes)
+/// Volume of a pack of points [m^2, in three dimensions m^3].
+template <class Support, int dim, class Lanes>
+TESTBED_INLINE inline Pack volume(const Points<dim>& q, std::size_t p, const Lanes& lanes)
 {
     if constexpr (Support::has_box)
-        return Pack(4.0) * lanes.load(&q.half_x[p]) * lanes.load(&q.half_y[p]);
+    {
+        Pack v(1 << dim);
+        unrolled<dim>([&](auto d) TESTBED_INLINE { v *= lanes.load(&q.half_width[d][p]); });
+        return v;
+    }
     else
         return lanes.load(&q.volume[p]);
 }
 
-/// Volume, or box, of a pack of points after the strain increment d.
-template <class Support, class Lanes>
-TESTBED_INLINE inline void stretch(Points& q, std::size_t p, const Lanes& lanes, const StrainIncrement& increment, const Gradient<Pack>& d)
+/// Volume, or box, of a pack of points after the strain increment g.
+template <class Support, int dim, class Lanes>
+TESTBED_INLINE inline void stretch(Points<dim>& q, std::size_t p, const Lanes& lanes, const StrainIncrement& increment,
+                                   const Gradient<dim, Pack>& g)
 {
     if constexpr (Support::has_box)
-    {
-        lanes.store(&q.half_x[p], lanes.load(&q.half_x[p]) * increment.stretch(d.xx));
-        lanes.store(&q.half_y[p], lanes.load(&q.half_y[p]) * increment.stretch(d.yy));
-    }
+        unrolled<dim>([&](auto d) TESTBED_INLINE
+                      { lanes.store(&q.half_width[d][p], lanes.load(&q.half_width[d][p]) * increment.stretch(component<d, d>(g))); });
     else
-        lanes.store(&q.volume[p], lanes.load(&q.volume[p]) * increment.stretch(d.trace()));
+        lanes.store(&q.volume[p], lanes.load(&q.volume[p]) * increment.stretch(g.trace()));
 }
 
-/// Adds Q quantities of the points of each bin, weighted, to the bin's S x S blocks.
-/// @param quantities (p, lanes) -> array of Q packs @param partial S*S*Q numbers for each bin from `first_bin` on
-template <class Support, std::size_t Q, class Quantities>
-void spread(const Lattice& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial, Quantities&& quantities)
+/// Adds Q quantities of the points of each bin, weighted, to the bin's S^dim blocks.
+/// @param quantities (p, lanes) -> array of Q packs @param partial S^dim Q numbers for each bin from `first_bin` on
+template <class Support, std::size_t Q, int dim, class Quantities>
+void spread(const Lattice<dim>& lattice, const Body& body, std::size_t first_bin, std::vector<double>& partial, Quantities&& quantities)
 {
-    constexpr int S = Support::S;
+    constexpr std::size_t blocks = block_size<Support::S, dim>;
     const auto& bins = body.bins.list();
     parallel_for(bins.size(),
                  [&](std::size_t b)
                  {
-                     std::array<Pack, S * S * Q> total;
+                     std::array<Pack, blocks * Q> total;
                      set_zero(total);
                      const BinFrame frame(lattice, bins[b]);
                      for_each_pack(bins[b].begin, bins[b].end,
                                    [&](std::size_t p, const auto& lanes)
                                    {
-                                       const Corner c = frame.corner<Support>(body.points, p, lanes);
-                                       const auto wx = Support::weights(c.ax, c.wx), wy = Support::weights(c.ay, c.wy);
+                                       const Weights<Support, dim> weights(frame.template corner<Support>(body.points, p, lanes));
                                        const std::array<Pack, Q> value = quantities(p, lanes);
-                                       for (int j = 0; j < S; ++j)
-                                           for (int i = 0; i < S; ++i)
+                                       unrolled<blocks>(
+                                           [&](auto k)
                                            {
-                                               const Pack w = lanes.keep(wx[i] * wy[j]);
-                                               for (std::size_t k = 0; k < Q; ++k)
-                                                   total[(j * S + i) * Q + k] += w * value[k];
-                                           }
+                                               const Pack w = lanes.keep(weights.template of<k>());
+                                               unrolled<Q>([&](auto n) { total[k * Q + n] += w * value[n]; });
+                                           });
                                    });
-                     sum(total, &partial[(first_bin + b) * S * S * Q]);
+                     sum(total, &partial[(first_bin + b) * blocks * Q]);
                  });
 }
 
-/// The transpose: each point takes the weighted values of its S x S cells or nodes.
-/// @param index (i, j) -> number of the cell or node @param take (p, lanes, value)
-template <class Support, class Index, class Take>
-void interpolate(const Lattice& lattice, const Body& body, const std::vector<double>& values, Index&& index, Take&& take)
+/// The transpose: each point takes the weighted values of its S^dim cells or nodes.
+/// @param number Index<dim> -> number of the cell or node @param take (p, lanes, value)
+template <class Support, int dim, class Number, class Take>
+void interpolate(const Lattice<dim>& lattice, const Body& body, const std::vector<double>& values, Number&& number, Take&& take)
 {
-    constexpr int S = Support::S;
+    constexpr std::size_t blocks = block_size<Support::S, dim>;
     const auto& bins = body.bins.list();
     parallel_for(bins.size(),
                  [&](std::size_t b)
                  {
-                     std::array<double, static_cast<std::size_t>(S * S)> value;
-                     for (int j = 0; j < S; ++j)
-                         for (int i = 0; i < S; ++i)
-                             value[static_cast<std::size_t>(j * S + i)] = values[index(bins[b].i + i, bins[b].j + j)];
+                     std::array<double, blocks> value;
+                     for (std::size_t k = 0; k < blocks; ++k)
+                         value[k] = values[number(bins[b].at + block_index<Support::S, dim>(static_cast<int>(k)))];
                      const BinFrame frame(lattice, bins[b]);
                      for_each_pack(bins[b].begin, bins[b].end,
                                    [&](std::size_t p, const auto& lanes)
                                    {
-                                       const Corner c = frame.corner<Support>(body.points, p, lanes);
-                                       const auto wx = Support::weights(c.ax, c.wx), wy = Support::weights(c.ay, c.wy);
+                                       const Weights<Support, dim> weights(frame.template corner<Support>(body.points, p, lanes));
                                        Pack sum(0.0);
-                                       for (int j = 0; j < S; ++j)
-                                           for (int i = 0; i < S; ++i)
-                                               sum += wx[i] * wy[j] * Pack(value[static_cast<std::size_t>(j * S + i)]);
+                                       unrolled<blocks>([&](auto k) { sum += weights.template of<k>() * Pack(value[k]); });
                                        take(p, lanes, sum);
                                    });
                  });

@@ -4,7 +4,7 @@
 /// the rest (sums, cells and nodes in use) is not listed but made again by who reads.
 
 #include "core/base/field.hpp"
-#include "core/lattice/grid.hpp"
+#include "core/lattice/lattice.hpp"
 
 #include <fmt/format.h>
 #include <functional>
@@ -56,9 +56,17 @@ public:
     {
         self().part(name, unit, 1, [&](std::size_t) -> T& { return value; });
     }
-    void vector(std::string_view name, std::string_view unit, Vec2& value)
+    template <std::size_t dim>
+    void vector(std::string_view name, std::string_view unit, std::array<double, dim>& value)
     {
-        self().part(name, unit, 2, [&](std::size_t k) -> double& { return value[k]; });
+        self().part(name, unit, dim, [&](std::size_t k) -> double& { return value[k]; });
+    }
+    /// Its components under names that begin with i, j, k.
+    template <int dim>
+    void index(const std::string& ending, Index<dim>& value)
+    {
+        for (int d = 0; d < dim; ++d)
+            this->value(index_names[d] + ending, "-", value[d]);
     }
     /// With a flag that says whether there is a value.
     template <class T>
@@ -67,10 +75,10 @@ public:
         bool given = value.has_value();
         T held = value.value_or(T{});
         this->value(name + "_given", "-", given);
-        if constexpr (std::is_same_v<T, Vec2>)
-            vector(name, unit, held);
-        else
+        if constexpr (std::is_arithmetic_v<T>)
             this->value(name, unit, held);
+        else
+            vector(name, unit, held);
         if constexpr (Derived::reads)
             value = given ? std::optional<T>(held) : std::nullopt;
     }
@@ -82,22 +90,31 @@ public:
         self().part(
             name, unit, list.size(), [&](std::size_t k) -> auto& { return std::invoke(member, list[k]); });
     }
+    /// A list of an Index for each entry: a column for each of its components.
+    template <class T, class Member = std::identity>
+    void indices(std::vector<T>& list, Member member = {})
+    {
+        for (std::size_t d = 0; d < std::invoke(member, T{}).size(); ++d)
+            column(index_names[d], "-", list, [&](T& entry) -> int& { return std::invoke(member, entry)[d]; });
+    }
     template <class T>
     void field(Field<T>& field, std::size_t count)
     {
         self().part(field.name(), field.unit(), count, [&](std::size_t k) -> T& { return field[k]; });
     }
     /// Values at some nodes.
-    void nodal(std::string_view name, std::string_view unit, const Lattice& lattice, const std::vector<NodeIndex>& at,
+    template <int dim>
+    void nodal(std::string_view name, std::string_view unit, const Lattice<dim>& lattice, const std::vector<Index<dim>>& at,
                std::vector<double>& values)
     {
-        self().part(name, unit, at.size(), [&](std::size_t k) -> double& { return values[lattice.node(at[k].i, at[k].j)]; });
+        self().part(name, unit, at.size(), [&](std::size_t k) -> double& { return values[lattice.node(at[k])]; });
     }
 
 protected:
     const std::string& group_name() const { return group_; }
 
 private:
+    static constexpr std::array<const char*, 3> index_names{"i", "j", "k"};
     Derived& self() { return static_cast<Derived&>(*this); }
     std::string group_;
 };

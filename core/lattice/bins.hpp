@@ -1,9 +1,9 @@
 #pragma once
 /// Points kept contiguous by bin. A bin is the cell that holds the lower left corner of a point's support, so that all its
-/// points touch the same S x S cells or nodes. Points are sorted only in a step in which one changed its bin, the list of bins changes only
-/// if one is new or empty.
+/// points touch the same S x S (x S) cells or nodes. Points are sorted only in a step in which one changed its bin, the list of bins
+/// changes only if one is new or empty.
 
-#include "core/lattice/grid.hpp"
+#include "core/lattice/lattice.hpp"
 #include "core/lattice/points.hpp"
 
 #include <algorithm>
@@ -21,18 +21,20 @@ namespace testbed
 /// Rounding must not move a box that ends on a lattice line into the next cell [cells].
 inline constexpr double bin_tolerance = 1e-9;
 
+template <int dim>
 struct Bin
 {
-    int i = 0, j = 0;
+    Index<dim> at{};                   ///< cell
     std::uint32_t begin = 0, end = 0;  ///< points
 };
 
+template <int dim>
 class Bins
 {
 public:
-    explicit Bins(const Lattice& lattice) : lattice_(lattice), slots_(without_numbers(lattice)) {}
+    explicit Bins(const Lattice<dim>& lattice) : lattice_(lattice), slots_(without_numbers(lattice)) {}
 
-    const std::vector<Bin>& list() const { return bins_; }
+    const std::vector<Bin<dim>>& list() const { return bins_; }
     /// The number that bin b had before the last rebuild() if the same points are in it, which then were not marked.
     std::optional<std::uint32_t> unchanged(std::size_t b) const { return before_[b] == none ? std::nullopt : std::optional(before_[b]); }
     std::size_t size_before() const { return size_before_; }
@@ -47,13 +49,13 @@ public:
     /// @param workspace grows to the number of points
     /// @throws Diverged when a point has left the lattice or its position is not finite.
     template <class Support>
-    bool rebuild(Points& points, std::vector<double>& workspace)
+    bool rebuild(Points<dim>& points, std::vector<double>& workspace)
     {
         const bool is_first = bins_.empty();
         size_before_ = bins_.size();
         if (is_first)
         {
-            bins_.push_back({0, 0, 0, static_cast<std::uint32_t>(points.count)});
+            bins_.push_back({{}, 0, static_cast<std::uint32_t>(points.count)});
             marked_.assign(1, 1);
         }
         before_.resize(bins_.size());
@@ -67,7 +69,7 @@ public:
             throw_left_lattice(points, *lost);
         }
         if (is_first)
-            std::tie(bins_[0].i, bins_[0].j) = std::pair(lattice_.cell_i(key_[0]), lattice_.cell_j(key_[0]));
+            bins_[0].at = lattice_.cell_index(key_[0]);
         make_slots();
         const bool has_new = insert_new();
         exchange();
@@ -87,10 +89,9 @@ public:
     template <class Archive>
     void state(Archive& a)
     {
-        a.column("i", "-", bins_, &Bin::i);
-        a.column("j", "-", bins_, &Bin::j);
-        a.column("begin", "-", bins_, &Bin::begin);
-        a.column("end", "-", bins_, &Bin::end);
+        a.indices(bins_, &Bin<dim>::at);
+        a.column("begin", "-", bins_, &Bin<dim>::begin);
+        a.column("end", "-", bins_, &Bin<dim>::end);
         a.column("marked", "-", marked_);
         if constexpr (Archive::reads)
         {
@@ -102,7 +103,7 @@ public:
 
     std::size_t bytes() const
     {
-        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin) + moves_.capacity() * sizeof(Move) +
+        return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin<dim>) + moves_.capacity() * sizeof(Move) +
                marked_.capacity() +
                (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity()) * sizeof(std::uint32_t);
     }
@@ -117,7 +118,7 @@ private:
             marks_.push_back(static_cast<std::uint32_t>(m - marked_.begin()));
     }
     template <class Support>
-    void find_keys(const Points& points)
+    void find_keys(const Points<dim>& points)
     {
         key_.resize(points.count);
         parallel_for(marks_.size(),
@@ -150,17 +151,13 @@ private:
     /// Slots for all cells that points of marked bins go to.
     void make_slots()
     {
-        CellBox reach = no_cells;
-        for_each_marked(
-            [&](std::uint32_t, std::uint32_t p)
-            {
-                const int i = lattice_.cell_i(key_[p]), j = lattice_.cell_j(key_[p]);
-                reach.extend({i, j, i + 1, j + 1});
-            });
+        auto reach = CellBox<dim>::none();
+        const auto take = [&](const Index<dim>& cell) { reach.extend({cell, cell + all<dim>(1)}); };
+        for_each_marked([&](std::uint32_t, std::uint32_t p) { take(lattice_.cell_index(key_[p])); });
         if (with_numbers_for(slots_, reach).numbered == slots_.numbered)
             return;
-        for (const Bin& b : bins_)
-            reach.extend({b.i, b.j, b.i + 1, b.j + 1});
+        for (const Bin<dim>& b : bins_)
+            take(b.at);
         slots_ = with_numbers_for(slots_, reach);
         slot_.assign(slots_.cells(), -1);
         for (std::size_t b = 0; b < bins_.size(); ++b)
@@ -183,10 +180,10 @@ private:
         if (cells.empty())
             return false;
         std::sort(cells.begin(), cells.end());
-        const std::vector<Bin> old = std::exchange(bins_, {});
+        const std::vector<Bin<dim>> old = std::exchange(bins_, {});
         const std::vector<char> old_marked = std::exchange(marked_, {});
         before_.clear();
-        const auto add = [&](const Bin& bin, char is_marked, std::uint32_t number)
+        const auto add = [&](const Bin<dim>& bin, char is_marked, std::uint32_t number)
         {
             slot_of(bin) = static_cast<std::int32_t>(bins_.size());
             bins_.push_back(bin);
@@ -197,11 +194,11 @@ private:
         const auto add_up_to = [&](std::size_t end, std::uint32_t place)
         {
             for (; cell != cells.end() && *cell < end; ++cell)
-                add({lattice_.cell_i(*cell), lattice_.cell_j(*cell), place, place}, 0, none);
+                add({lattice_.cell_index(*cell), place, place}, 0, none);
         };
         for (std::uint32_t b = 0; b < old.size(); ++b)
         {
-            add_up_to(lattice_.cell(old[b].i, old[b].j), old[b].begin);
+            add_up_to(lattice_.cell(old[b].at), old[b].begin);
             add(old[b], old_marked[b], b);
         }
         add_up_to(none, old.back().end);
@@ -282,41 +279,39 @@ private:
 
     /// Number of the bin to which a point of a marked bin goes.
     std::uint32_t slot(std::uint32_t p) const { return static_cast<std::uint32_t>(slot_[place(key_[p])]); }
-    std::size_t place(std::uint32_t cell) const { return slots_.cell(lattice_.cell_i(cell), lattice_.cell_j(cell)); }
-    std::int32_t& slot_of(const Bin& bin) { return slot_[slots_.cell(bin.i, bin.j)]; }
+    std::size_t place(std::uint32_t cell) const { return slots_.cell(lattice_.cell_index(cell)); }
+    std::int32_t& slot_of(const Bin<dim>& bin) { return slot_[slots_.cell(bin.at)]; }
 
     template <class Support>
-    std::uint32_t key(const Points& points, std::size_t p) const
+    std::uint32_t key(const Points<dim>& points, std::size_t p) const
     {
         const double L = lattice_.cell_size;
-        const double cx = (points.x[p] - lattice_.origin[0]) / L, cy = (points.y[p] - lattice_.origin[1]) / L;
-        const bool inside = cx >= 0 && cx < lattice_.nx && cy >= 0 && cy < lattice_.ny;  // false for NaN
-        if (!inside)
-            return none;
         if constexpr (!Support::has_box)
             if (points.volume.active() && !(points.volume[p] > 0))
                 return none;
-        if constexpr (Support::has_box)
+        Index<dim> cell;
+        for (int d = 0; d < dim; ++d)
         {
-            if (!(points.half_x[p] > 0 && points.half_y[p] > 0))
+            const double c = (points.x[d][p] - lattice_.origin[d]) / L;
+            if (!(c >= 0 && c < lattice_.size[d]))  // NaN, too
                 return none;
-            const double hx = std::min(points.half_x[p] / L, 0.5), hy = std::min(points.half_y[p] / L, 0.5);
-            return static_cast<std::uint32_t>(lattice_.cell(static_cast<int>(std::floor(cx - hx + bin_tolerance)),
-                                                            static_cast<int>(std::floor(cy - hy + bin_tolerance))));
+            if constexpr (Support::has_box)
+            {
+                if (!(points.half_width[d][p] > 0))
+                    return none;
+                cell[d] = static_cast<int>(std::floor(c - std::min(points.half_width[d][p] / L, 0.5) + bin_tolerance));
+            }
+            else
+                cell[d] = static_cast<int>(std::floor(c - Support::half_width));
         }
-        else
-        {
-            constexpr double half = Support::half_width;
-            return static_cast<std::uint32_t>(
-                lattice_.cell(static_cast<int>(std::floor(cx - half)), static_cast<int>(std::floor(cy - half))));
-        }
+        return static_cast<std::uint32_t>(lattice_.cell(cell));
     }
 
-    [[noreturn]] static void throw_left_lattice(const Points& points, std::size_t p);
+    [[noreturn]] static void throw_left_lattice(const Points<dim>& points, std::size_t p);
 
-    Lattice lattice_;
-    std::vector<Bin> bins_;
-    Lattice slots_;                   ///< with numbers for the cells around the points
+    Lattice<dim> lattice_;
+    std::vector<Bin<dim>> bins_;
+    Lattice<dim> slots_;              ///< with numbers for the cells around the points
     std::vector<std::int32_t> slot_;  ///< number of the bin of each of these, or -1
     std::vector<char> marked_;
     std::vector<std::uint32_t> marks_;   ///< numbers of the marked bins
@@ -328,14 +323,14 @@ private:
     std::size_t size_before_ = 0;
 };
 
-/// The lattice with numbers for all that the S x S cells or nodes of bins touch.
-template <int S>
-Lattice with_numbers_for(const Lattice& lattice, std::span<const Bins* const> bins)
+/// The lattice with numbers for all that the S x S (x S) cells or nodes of bins touch.
+template <int S, int dim>
+Lattice<dim> with_numbers_for(const Lattice<dim>& lattice, std::span<const Bins<dim>* const> bins)
 {
-    CellBox reach = no_cells;
-    for (const Bins* b : bins)
-        for (const Bin& bin : b->list())
-            reach.extend({bin.i, bin.j, bin.i + S, bin.j + S});
+    auto reach = CellBox<dim>::none();
+    for (const Bins<dim>* b : bins)
+        for (const Bin<dim>& bin : b->list())
+            reach.extend({bin.at, bin.at + all<dim>(S)});
     return with_numbers_for(lattice, reach);
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Sums of bins meet at cells or nodes. Each bin writes its S x S blocks to a place of its own, and each active cell or node
+/// Sums of bins meet at cells or nodes. Each bin writes its S x S (x S) blocks to a place of its own, and each active cell or node
 /// then adds the blocks that belong to it in a fixed order: no two threads write to one place, no atomics.
 
 #include "core/lattice/bins.hpp"
@@ -17,15 +17,15 @@ public:
     const std::vector<std::uint32_t>& active() const { return active_; }  ///< ascending
     std::size_t blocks() const { return blocks_; }
 
-    /// @param bins of all bodies, in order; block (slot * S*S + k) is the k-th entity, row by row, of bin number `slot`.
-    /// @param index (i, j) -> number of the entity.
-    template <int S, class Index>
-    void rebuild(std::span<const Bins* const> bins, Index&& index)
+    /// @param bins of all bodies, in order; block (slot * S^dim + k) is the k-th entity, row by row, of bin number `slot`.
+    /// @param number Index<dim> -> number of the entity.
+    template <int S, int dim, class Number>
+    void rebuild(std::span<const Bins<dim>* const> bins, Number&& number)
     {
         for (const auto e : active_)
             position_[e] = -1;
         active_.clear();
-        for_each_block<S>(bins, index,
+        for_each_block<S>(bins, number,
                           [&](std::size_t e, std::uint32_t)
                           {
                               if (position_[e] < 0)
@@ -39,12 +39,12 @@ public:
         begin_.assign(active_.size() + 1, 0);
         for (std::size_t a = 0; a < active_.size(); ++a)
             position_[active_[a]] = static_cast<std::int32_t>(a);
-        for_each_block<S>(bins, index, [&](std::size_t e, std::uint32_t) { ++begin_[static_cast<std::size_t>(position_[e]) + 1]; });
+        for_each_block<S>(bins, number, [&](std::size_t e, std::uint32_t) { ++begin_[static_cast<std::size_t>(position_[e]) + 1]; });
         std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
         block_.resize(begin_.back());
         std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
         blocks_ = 0;
-        for_each_block<S>(bins, index,
+        for_each_block<S>(bins, number,
                           [&](std::size_t e, std::uint32_t block)
                           {
                               block_[next[static_cast<std::size_t>(position_[e])]++] = block;
@@ -74,15 +74,14 @@ public:
     }
 
 private:
-    template <int S, class Index, class F>
-    static void for_each_block(std::span<const Bins* const> bins, Index&& index, F&& f)
+    template <int S, int dim, class Number, class F>
+    static void for_each_block(std::span<const Bins<dim>* const> bins, Number&& number, F&& f)
     {
         std::uint32_t block = 0;
-        for (const Bins* b : bins)
-            for (const Bin& bin : b->list())
-                for (int dj = 0; dj < S; ++dj)
-                    for (int di = 0; di < S; ++di)
-                        f(index(bin.i + di, bin.j + dj), block++);
+        for (const Bins<dim>* b : bins)
+            for (const Bin<dim>& bin : b->list())
+                for (int k = 0; k < block_size<S, dim>; ++k)
+                    f(number(bin.at + block_index<S, dim>(k)), block++);
     }
 
     std::vector<std::int32_t> position_;

@@ -1,11 +1,8 @@
 #pragma once
 /// Gauss's theorem on a cell (eqs. (1)-(5)) and the nodal forces dual to it (eq. (9)), with nodes
-/// [1]..[4] in the numbering of grid.hpp.
+/// [1]..[4] in the numbering of lattice.hpp.
 
-#include "core/base/simd.hpp"
 #include "core/base/types.hpp"
-
-#include <array>
 
 namespace testbed
 {
@@ -19,7 +16,7 @@ struct StrainIncrement
     /// The inverse of the determinant is taken as 1 - e + e^2: what is left out is of third order in the strain of one step, as is what the
     /// midpoint itself leaves out, and a division costs as much as all else.
     template <class T>
-    TESTBED_INLINE Gradient<T> of(const Gradient<T>& g) const
+    TESTBED_INLINE Gradient<2, T> of(const Gradient<2, T>& g) const
     {
         const T det = g.xx * g.yy - g.xy * g.yx, share(theta), half = share * det;
         const T e = share * (g.trace() + half), inverse = T(1.0) - e * (T(1.0) - e);
@@ -33,20 +30,48 @@ struct StrainIncrement
     }
 };
 
-/// Eqs. (5a)-(5d) on a square cell: nodal values ux[4], uy[4] of a velocity [m/s] or increment [m], scale = dt/(2L) or 1/(2L).
-template <class T>
-Gradient<T> square_gradient(const std::array<T, 4>& ux, const std::array<T, 4>& uy, T scale)
+/// Whether corner k = 0..2^dim - 1 of a cell, node [k+1] of lattice.hpp, is on the upper side in direction d.
+constexpr bool is_upper(std::size_t k, std::size_t d)
 {
-    return {(ux[1] + ux[3] - ux[0] - ux[2]) * scale, (uy[2] + uy[3] - uy[0] - uy[1]) * scale, (ux[2] + ux[3] - ux[0] - ux[1]) * scale,
-            (uy[1] + uy[3] - uy[0] - uy[2]) * scale};
+    return (k >> d & 1) != 0;
 }
 
-/// Eq. (9) on a square cell: force at node k = 0..3 from the smeared stress s [Pa]; half_side = L/2.
-template <class T>
-std::array<T, 2> square_force(int k, const SymTensor<T>& s, double half_side)
+/// Eqs. (5a)-(5d) on a square or cubic cell: gradient of a velocity [m/s] or increment [m] with these components at the corners;
+/// scale = dt / (2^(dim-1) L) or 1 / (2^(dim-1) L).
+template <std::size_t dim, class T, std::size_t corners>
+TESTBED_INLINE inline Gradient<dim, T> cell_gradient(const std::array<std::array<T, corners>, dim>& u, T scale)
 {
-    const T a((k == 1 || k == 3) ? -half_side : half_side);  // -1/2 (y[k+1] - y[k-1])
-    const T b((k >= 2) ? -half_side : half_side);            // -1/2 (x[k-1] - x[k+1])
-    return {s.xx * a + s.xy * b, s.xy * a + s.yy * b};
+    static_assert(corners == 1 << dim);
+    Gradient<dim, T> g;
+    unrolled<dim * dim>(
+        [&](auto n) TESTBED_INLINE
+        {
+            constexpr std::size_t i = n / dim, j = n % dim, first = std::size_t{1} << j;
+            T difference = u[i][first];
+            unrolled<corners>(
+                [&](auto k) TESTBED_INLINE
+                {
+                    if constexpr (is_upper(k, j) && k != first)
+                        difference += u[i][k];
+                });
+            unrolled<corners>(
+                [&](auto k) TESTBED_INLINE
+                {
+                    if constexpr (!is_upper(k, j))
+                        difference -= u[i][k];
+                });
+            component<i, j>(g) = difference * scale;
+        });
+    return g;
+}
+
+/// Eq. (9) on a square or cubic cell: force at corner k from the smeared stress s [Pa]; share = (L/2)^(dim-1), that of a corner in a face.
+template <std::size_t k, int dim, class T>
+TESTBED_INLINE inline Vec<dim, T> corner_force(const SymTensor<dim, T>& s, double share)
+{
+    Vec<dim, T> f;
+    unrolled<dim>([&](auto i) TESTBED_INLINE
+                  { f[i] = total<dim>([&](auto j) TESTBED_INLINE { return component<i, j>(s) * T(is_upper(k, j) ? -share : share); }); });
+    return f;
 }
 }  // namespace testbed

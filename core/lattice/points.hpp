@@ -3,21 +3,56 @@
 /// everything else is a field, present only when the method, the material or the scene needs it.
 
 #include "core/base/field.hpp"
+#include "core/base/types.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace testbed
 {
+/// The fields of a vector or tensor, by component.
+template <std::size_t n>
+std::array<Field<double>, n> fields(const std::array<const char*, n>& names, const char* unit)
+{
+    return [&]<std::size_t... k>(std::index_sequence<k...>)
+    {
+        return std::array<Field<double>, n>{Field<double>(names[k], unit)...};
+    }
+    (std::make_index_sequence<n>{});
+}
+
+/// Names of components, by dimension.
+template <int dim>
+struct Components;
+template <>
+struct Components<2>
+{
+    static constexpr std::array position{"x", "y"}, initial_position{"X", "Y"}, half_width{"half_width_x", "half_width_y"},
+        velocity{"velocity_x", "velocity_y"}, stress{"stress_xx", "stress_yy", "stress_xy"};
+};
+template <>
+struct Components<3>
+{
+    static constexpr std::array position{"x", "y", "z"}, initial_position{"X", "Y", "Z"},
+        half_width{"half_width_x", "half_width_y", "half_width_z"}, velocity{"velocity_x", "velocity_y", "velocity_z"},
+        stress{"stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy"};
+};
+
+template <int dim>
 struct Points
 {
-    Field<double> x{"x", "m"}, y{"y", "m"};  ///< current position
-    Field<double> X{"X", "m"}, Y{"Y", "m"};  ///< initial position, if a step needs it; else see the id
-    Field<double> sxx{"stress_xx", "Pa"}, syy{"stress_yy", "Pa"}, sxy{"stress_xy", "Pa"};
-    Field<double> volume{"volume", "m^2"};                                   ///< current, per metre of thickness
-    Field<double> half_x{"half_width_x", "m"}, half_y{"half_width_y", "m"};  ///< the point's own box, if it has one
-    Field<double> vx{"velocity_x", "m/s"}, vy{"velocity_y", "m/s"};          ///< MPM: the velocity lives on the points
+    using Vector = std::array<Field<double>, dim>;
+    using Tensor = std::array<Field<double>, symmetric_components<dim>>;
+
+    Vector x = fields(Components<dim>::position, "m");
+    Vector X = fields(Components<dim>::initial_position, "m");  ///< if a step needs it; else see the id
+    Tensor stress = fields(Components<dim>::stress, "Pa");
+    Field<double> volume{"volume", "m^2"};                                   ///< current, in plane strain per metre of thickness
+    Vector half_width = fields(Components<dim>::half_width, "m");            ///< of the point's own box, if it has one
+    Vector v = fields(Components<dim>::velocity, "m/s");                     ///< MPM: the velocity lives on the points
     Field<double> stiffness{"stiffness_ratio", "-"};                         ///< E(X, Y) / E of the material
-    Field<double> szz{"stress_zz", "Pa"};                                    ///< if it does not follow from the others
+    Field<double> szz{"stress_zz", "Pa"};                                    ///< plane strain: if it does not follow from the others
     Field<double> plastic_shear{"plastic_shear_strain", "-", shown_always};  ///< accumulated
     Field<double> softening_strain{"softening_strain", "-", shown_always};   ///< nonlocal: what drives softening
     Field<double> cohesion{"cohesion", "Pa", shown_at_start};                ///< of the point, before softening
@@ -43,7 +78,34 @@ struct Points
     }
 
     /// Volume of point p; a point with a box needs no volume of its own.
-    double current_volume(std::size_t p) const { return half_x.active() ? 4 * half_x[p] * half_y[p] : volume[p]; }
+    double current_volume(std::size_t p) const
+    {
+        if (!has_box())
+            return volume[p];
+        double v = 1 << dim;
+        for (const auto& half : half_width)
+            v *= half[p];
+        return v;
+    }
+    bool has_box() const { return half_width[0].active(); }
+    SymTensor<dim> stress_at(std::size_t p) const
+    {
+        SymTensor<dim> s;
+        unrolled<symmetric_components<dim>>([&](auto k) { component<k>(s) = stress[k][p]; });
+        return s;
+    }
+    template <class Lanes>
+    TESTBED_INLINE SymTensor<dim, Pack> stress_at(std::size_t p, const Lanes& lanes) const
+    {
+        SymTensor<dim, Pack> s;
+        unrolled<symmetric_components<dim>>([&](auto k) TESTBED_INLINE { component<k>(s) = lanes.load(&stress[k][p]); });
+        return s;
+    }
+    template <class Lanes>
+    TESTBED_INLINE void set_stress(std::size_t p, const Lanes& lanes, const SymTensor<dim, Pack>& s)
+    {
+        unrolled<symmetric_components<dim>>([&](auto k) TESTBED_INLINE { lanes.store(&stress[k][p], component<k>(s)); });
+    }
 
     template <class Archive>
     void state(Archive& a)
@@ -55,9 +117,42 @@ private:
     template <class Self, class F>
     static void visit(Self& self, F& f)
     {
-        const auto if_active = [&](auto&... fields) { ((fields.active() ? f(fields) : void()), ...); };
-        if_active(self.x, self.y, self.X, self.Y, self.sxx, self.syy, self.sxy, self.volume, self.half_x, self.half_y, self.vx, self.vy,
-                  self.stiffness, self.szz, self.plastic_shear, self.softening_strain, self.cohesion, self.sin_friction, self.id);
+        const auto one = [&](auto& field) { field.active() ? f(field) : void(); };
+        const auto each = [&](auto&... lists) { (std::for_each(lists.begin(), lists.end(), one), ...); };
+        each(self.x, self.X, self.stress);
+        one(self.volume);
+        each(self.half_width, self.v);
+        const auto rest = [&](auto&... fields) { (one(fields), ...); };
+        rest(self.stiffness, self.szz, self.plastic_shear, self.softening_strain, self.cohesion, self.sin_friction, self.id);
     }
 };
+
+/// A vector at the points [p, p + lanes).
+template <std::size_t dim, class Lanes>
+TESTBED_INLINE inline std::array<Pack, dim> load(const std::array<Field<double>, dim>& vector, std::size_t p, const Lanes& lanes)
+{
+    std::array<Pack, dim> v;
+    unrolled<dim>([&](auto d) TESTBED_INLINE { v[d] = lanes.load(&vector[d][p]); });
+    return v;
+}
+template <std::size_t dim, class Lanes>
+TESTBED_INLINE inline void store(std::array<Field<double>, dim>& vector, std::size_t p, const Lanes& lanes, const std::array<Pack, dim>& v)
+{
+    unrolled<dim>([&](auto d) TESTBED_INLINE { lanes.store(&vector[d][p], v[d]); });
+}
+/// That of point p.
+template <std::size_t dim>
+std::array<double, dim> at(const std::array<Field<double>, dim>& vector, std::size_t p)
+{
+    std::array<double, dim> v;
+    for (std::size_t d = 0; d < dim; ++d)
+        v[d] = vector[d][p];
+    return v;
+}
+template <std::size_t dim>
+void set(std::array<Field<double>, dim>& vector, std::size_t p, const std::array<double, dim>& v)
+{
+    for (std::size_t d = 0; d < dim; ++d)
+        vector[d][p] = v[d];
+}
 }  // namespace testbed

@@ -3,6 +3,7 @@
 
 #include "core/bodies/support.hpp"
 #include "core/lattice/gather.hpp"
+#include "core/lattice/nodes.hpp"
 #include "core/scene/formula.hpp"
 
 namespace testbed
@@ -18,21 +19,21 @@ public:
         std::size_t points = 0;
         for (const Body& body : bodies)
             points += body.points.count;
-        bx_.resize(points + pack_size);
-        by_.resize(points + pack_size);
+        for (auto& component : acceleration_at_points_)
+            component.resize(points + pack_size);
         std::size_t first = 0;
         for (const Body& body : bodies)
         {
-            const Points& q = body.points;
-            const std::array<double*, 2> results{&bx_[first], &by_[first]};
-            acceleration_.evaluate({q.X.data(), q.Y.data(), q.x.data(), q.y.data(), t}, q.count, results);
+            const Points<2>& q = body.points;
+            const std::array<double*, 2> results{&acceleration_at_points_[0][first], &acceleration_at_points_[1][first]};
+            acceleration_.evaluate({q.X[0].data(), q.X[1].data(), q.x[0].data(), q.x[1].data(), t}, q.count, results);
             first += q.count;
         }
     }
 
-    /// Adds the force of all bodies: sink(entity, {F_x, F_y}) for each active cell or node of `gather`.
+    /// Adds the force of all bodies: sink(entity, force) for each active cell or node of `gather`.
     template <class Support, class Sink>
-    void apply(const Lattice& lattice, const std::vector<Body>& bodies, const Gather& gather, Sink&& sink)
+    void apply(const Lattice<2>& lattice, const std::vector<Body>& bodies, const Gather& gather, Sink&& sink)
     {
         partial_.resize(gather.blocks() * 2);
         std::size_t first_bin = 0, first = 0;
@@ -40,19 +41,23 @@ public:
         {
             const Pack weight(body.points.mass * body.points.weight_share);
             spread<Support, 2>(lattice, body, first_bin, partial_,
-                               [&](std::size_t p, const auto& lanes) {
-                                   return std::array<Pack, 2>{weight * lanes.load(&bx_[first + p]), weight * lanes.load(&by_[first + p])};
+                               [&](std::size_t p, const auto& lanes)
+                               {
+                                   Vec<2, Pack> force = load(acceleration_at_points_, first + p, lanes);
+                                   for (Pack& component : force)
+                                       component *= weight;
+                                   return force;
                                });
             first_bin += body.bins.list().size();
             first += body.points.count;
         }
         gather.sum<2>(partial_, sink);
     }
-    std::size_t bytes() const { return (bx_.capacity() + by_.capacity() + partial_.capacity()) * sizeof(double); }
+    std::size_t bytes() const { return (2 * acceleration_at_points_[0].capacity() + partial_.capacity()) * sizeof(double); }
 
 private:
     Formula acceleration_;
-    std::vector<double> bx_, by_;  ///< by point, body after body [m/s^2]
+    VectorField<2> acceleration_at_points_;  ///< body after body [m/s^2]
     std::vector<double> partial_;
 };
 }  // namespace testbed

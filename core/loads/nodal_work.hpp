@@ -2,7 +2,7 @@
 /// Work at the nodes, kept up in every step by passes that have the forces and velocities at hand anyway: the part of the energy ledger
 /// (ledger.hpp) that cannot be had from states some steps apart.
 
-#include "core/lattice/grid.hpp"
+#include "core/lattice/nodes.hpp"
 
 namespace testbed
 {
@@ -35,14 +35,14 @@ struct NodalWork
 /// What a kick did.
 struct Kick
 {
-    double work = 0;       ///< sum of f . (v before + v after) / 2 dt: exactly the change of the kinetic energy [J/m]
-    Vec2 transport{0, 0};  ///< sum of m (v before + v after) / 2 dt: mass times way [kg]
-    double damping = 0;    ///< what damping took [J/m]
+    double work = 0;         ///< sum of f . (v before + v after) / 2 dt: exactly the change of the kinetic energy [J/m]
+    Vec<2> transport{0, 0};  ///< sum of m (v before + v after) / 2 dt: mass times way [kg]
+    double damping = 0;      ///< what damping took [J/m]
 };
 
 /// Sums K packs over the nodes in use, in a fixed order: term(i, lanes), zero in the lanes that are not in use.
-template <std::size_t K, class Term>
-std::array<double, K> sum_over_nodes(const Nodes& nodes, Term&& term)
+template <std::size_t K, int dim, class Term>
+std::array<double, K> sum_over_nodes(const Nodes<dim>& nodes, Term&& term)
 {
     const auto& runs = nodes.runs();
     return ordered_sum<K>(
@@ -66,12 +66,11 @@ std::array<double, K> sum_over_nodes(const Nodes& nodes, Term&& term)
 }
 
 /// Power of the nodal forces at the velocity before the kick [W/m].
-inline double nodal_power(const Nodes& nodes)
+template <int dim>
+double nodal_power(const Nodes<dim>& nodes)
 {
-    return sum_over_nodes<1>(nodes,
-                             [&](std::size_t i, const auto& lanes) {
-                                 return std::array{lanes.load(&nodes.fx[i]) * lanes.load(&nodes.vx[i]) +
-                                                   lanes.load(&nodes.fy[i]) * lanes.load(&nodes.vy[i])};
-                             })[0];
+    return sum_over_nodes<1>(
+        nodes, [&](std::size_t i, const auto& lanes)
+        { return std::array{total<dim>([&](auto d) { return lanes.load(&nodes.f[d][i]) * lanes.load(&nodes.v[d][i]); })}; })[0];
 }
 }  // namespace testbed

@@ -6,43 +6,43 @@ namespace testbed
 {
 namespace
 {
-Restraint make_boundary(const BoundarySpec& spec, const Scene& scene, const Lattice& lattice)
+Restraint make_boundary(const BoundarySpec& spec, const Scene& scene, const Lattice<2>& lattice)
 {
     const Expression where(spec.where, scene.expression_constants());
     Restraint restraint{spec.name, {}};
-    for (int j = -1; j <= lattice.ny + 1; ++j)
-        for (int i = -1; i <= lattice.nx + 1; ++i)
-        {
-            const Vec2 x = lattice.node_position({i, j});
-            if (!holds_near(where, x[0], x[1], 1e-6 * lattice.cell_size))
-                continue;
-            if (fixes(spec.fix, 0))
-                restraint.components[0].nodes.push_back({i, j});
-            if (fixes(spec.fix, 1))
-                restraint.components[1].nodes.push_back({i, j});
-        }
-    if (restraint.components[0].empty() && restraint.components[1].empty())
+    for_each_index(all<2>(-1), lattice.size + all<2>(2),
+                   [&](const Index<2>& n)
+                   {
+                       const Vec<2> x = lattice.node_position(n);
+                       if (!holds_near(where, x[0], x[1], 1e-6 * lattice.cell_size))
+                           return;
+                       for (std::size_t d = 0; d < restraint.components.size(); ++d)
+                           if (fixes(spec.fix, d))
+                               restraint.components[d].nodes.push_back(n);
+                   });
+    if (std::all_of(restraint.components.begin(), restraint.components.end(), [](const auto& component) { return component.empty(); }))
         throw SceneError(
             fmt::format("{}: boundary '{}': where = \"{}\" holds at no node of the lattice", scene.path, spec.name, spec.where));
     return restraint;
 }
 
 /// The restraint other than `own` that holds all of the nodes in the component in which they are driven, if there is one.
-const Restraint* in_the_way(const std::vector<NodeIndex>& nodes, const Restraint& own, const std::vector<Restraint>& all)
+const Restraint* in_the_way(const std::vector<Index<2>>& nodes, const Restraint& own, const std::vector<Restraint>& all)
 {
     const auto holds = [&](const ComponentRestraint& other, const ComponentRestraint& driven)
     {
-        const auto held = [&](const NodeIndex& n) { return std::binary_search(other.nodes.begin(), other.nodes.end(), n); };
+        const auto held = [&](const Index<2>& n) { return std::binary_search(other.nodes.begin(), other.nodes.end(), n); };
         return driven.velocity != 0 && other.velocity != driven.velocity && std::all_of(nodes.begin(), nodes.end(), held);
     };
     for (const Restraint& other : all)
-        if (&other != &own && (holds(other.components[0], own.components[0]) || holds(other.components[1], own.components[1])))
-            return &other;
+        for (std::size_t d = 0; d < own.components.size(); ++d)
+            if (&other != &own && holds(other.components[d], own.components[d]))
+                return &other;
     return nullptr;
 }
 }  // namespace
 
-NodeOps::NodeOps(const Scene& scene, const Lattice& lattice)
+NodeOps::NodeOps(const Scene& scene, const Lattice<2>& lattice)
 {
     if (scene.gravity)
         gravity_ = make_gravity(*scene.gravity);
@@ -61,8 +61,8 @@ NodeOps::NodeOps(const Scene& scene, const Lattice& lattice)
 void NodeOps::begin_step(const Step& step)
 {
     power_ = {};
-    load_x_.clear();
-    load_y_.clear();
+    for (auto& component : load_)
+        component.clear();
     for (std::size_t k = 0; k < walls_.size(); ++k)
     {
         Restraint& own = restraints_[first_wall_ + k];
@@ -76,18 +76,17 @@ void NodeOps::begin_step(const Step& step)
     }
 }
 
-void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, const Step& step)
+void NodeOps::apply_forces(const Lattice<2>& lattice, Nodes<2>& nodes, const Step& step)
 {
     if (gravity_)
     {
         gravity_->apply(nodes, weight_of(nodes), step.t);
-        const double factor = gravity_->factor(step.t);
-        gravity_now_ = {factor * gravity_->acceleration[0], factor * gravity_->acceleration[1]};
+        gravity_now_ = gravity_->now(step.t);
     }
     find_driven(lattice, nodes);
     driven_.react(restraints_, nodes);
     for (const Restraint& r : restraints_)
-        for (std::size_t k = 0; k < 2; ++k)
+        for (std::size_t k = 0; k < r.components.size(); ++k)
             power_.restraints += r.reaction[k] * r.components[k].velocity;
     if (!damping_)
         return;
@@ -95,11 +94,11 @@ void NodeOps::apply_forces(const Lattice& lattice, Nodes& nodes, const Step& ste
     power_.restraints += driven_.hold_faces(restraints_, nodes);  // what damping puts on the nodes of a face must not move the wall
 }
 
-double NodeOps::load_power(const Nodes& nodes) const
+double NodeOps::load_power(const Nodes<2>& nodes) const
 {
     double power = 0;
     for (const auto n : nodes.active())
-        power += load_x_[n] * nodes.vx[n] + load_y_[n] * nodes.vy[n];
+        power += total<2>([&](auto d) { return load_[d][n] * nodes.v[d][n]; });
     return power;
 }
 
@@ -113,30 +112,30 @@ void NodeOps::add_work(const Kick& kick, double loads, double dt, NodalWork& wor
     work.hourglass += power_.hourglass * dt;
 }
 
-void NodeOps::kick(Nodes& nodes, double dt)
+void NodeOps::kick(Nodes<2>& nodes, double dt)
 {
-    const bool loaded = !load_x_.empty();
+    const bool loaded = !load_[0].empty();
     const double before = loaded ? load_power(nodes) : 0;
     const Kick kick = damping_ ? accelerate(nodes, weight_of(nodes), dt, *damping_) : accelerate(nodes, weight_of(nodes), dt);
     add_work(kick, loaded ? 0.5 * (before + load_power(nodes)) : 0, dt, work_);
 }
 
-NodalWork NodeOps::work(const Nodes& nodes, double lag) const
+NodalWork NodeOps::work(const Nodes<2>& nodes, double lag) const
 {
     const std::vector<double>& mass = weight_of(nodes);
     const auto s = sum_over_nodes<3>(nodes,
                                      [&](std::size_t i, const auto& lanes)
                                      {
                                          const Pack m = lanes.load(&mass[i]);
-                                         const Pack vx = lanes.load(&nodes.vx[i]), vy = lanes.load(&nodes.vy[i]);
+                                         const Vec<2, Pack> v = load(nodes.v, i, lanes);
                                          Pack taken(0.0);
                                          if (damping_)
-                                             taken = damping_->taken(lanes.load(&nodes.fx[i]), vx) * vx +
-                                                     damping_->taken(lanes.load(&nodes.fy[i]), vy) * vy;
-                                         return std::array{m * vx, m * vy, taken};
+                                             taken =
+                                                 total<2>([&](auto d) { return damping_->taken(lanes.load(&nodes.f[d][i]), v[d]) * v[d]; });
+                                         return std::array{m * v[0], m * v[1], taken};
                                      });
     NodalWork now = work_;
-    add_work({lag * nodal_power(nodes), {lag * s[0], lag * s[1]}, lag * s[2]}, load_x_.empty() ? 0 : load_power(nodes), lag, now);
+    add_work({lag * nodal_power(nodes), {lag * s[0], lag * s[1]}, lag * s[2]}, load_[0].empty() ? 0 : load_power(nodes), lag, now);
     return now;
 }
 

@@ -16,7 +16,7 @@ namespace testbed
 /// Eq. (11): F += g m, growing from zero over the ramp.
 struct Gravity
 {
-    Vec2 acceleration;
+    Vec<2> acceleration;
     double ramp;
     bool linear = false;
 
@@ -27,17 +27,18 @@ struct Gravity
         return linear ? t / ramp : 0.5 * (1 - std::cos(std::numbers::pi * t / ramp));
     }
 
-    void apply(Nodes& nodes, double t) const { apply(nodes, nodes.mass, t); }
+    Vec<2> now(double t) const { return {factor(t) * acceleration[0], factor(t) * acceleration[1]}; }
+
+    void apply(Nodes<2>& nodes, double t) const { apply(nodes, nodes.mass, t); }
     /// @param mass of the nodes, that has weight
-    void apply(Nodes& nodes, const std::vector<double>& mass, double t) const
+    void apply(Nodes<2>& nodes, const std::vector<double>& mass, double t) const
     {
-        const Pack gx(factor(t) * acceleration[0]), gy(factor(t) * acceleration[1]);
+        const Vec<2> g = now(t);
         nodes.for_each(
             [&](std::size_t i, const auto& lanes)
             {
                 const Pack m = lanes.load(&mass[i]);
-                lanes.store(&nodes.fx[i], lanes.load(&nodes.fx[i]) + gx * m);
-                lanes.store(&nodes.fy[i], lanes.load(&nodes.fy[i]) + gy * m);
+                unrolled<2>([&](auto d) { lanes.store(&nodes.f[d][i], lanes.load(&nodes.f[d][i]) + Pack(g[d]) * m); });
             });
     }
 };
@@ -60,14 +61,11 @@ struct LocalDamping
         stdx::where(left * velocity > Pack(0.0), share) = Pack(alpha / (1 - alpha));
         return along(share * max(left, -left), velocity);
     }
-    void apply(Nodes& nodes) const
+    void apply(Nodes<2>& nodes) const
     {
         nodes.for_each(
             [&](std::size_t i, const auto& lanes)
-            {
-                lanes.store(&nodes.fx[i], damped(lanes.load(&nodes.fx[i]), lanes.load(&nodes.vx[i])));
-                lanes.store(&nodes.fy[i], damped(lanes.load(&nodes.fy[i]), lanes.load(&nodes.vy[i])));
-            });
+            { unrolled<2>([&](auto d) { lanes.store(&nodes.f[d][i], damped(lanes.load(&nodes.f[d][i]), lanes.load(&nodes.v[d][i]))); }); });
     }
 
 private:
@@ -88,40 +86,48 @@ struct NoDamping
 
 /// Eqs. (12), (14): v += F / m dt. Returns the work of the forces, exact to rounding, with the velocity in the middle of the kick.
 /// @param weight mass of the nodes, that has weight @param damping that the forces have gone through
-template <class Damping = NoDamping>
-Kick accelerate(Nodes& nodes, const std::vector<double>& weight, double dt, const Damping& damping = {})
+template <int dim, class Damping = NoDamping>
+Kick accelerate(Nodes<dim>& nodes, const std::vector<double>& weight, double dt, const Damping& damping = {})
 {
-    const Pack half(0.5);
-    const auto s = sum_over_nodes<4>(nodes,
-                                     [&](std::size_t i, const auto& lanes)
-                                     {
-                                         const Pack step = inverse_mass(nodes, i, lanes) * Pack(dt), m = lanes.load(&nodes.mass[i]);
-                                         const Pack fx = lanes.load(&nodes.fx[i]), fy = lanes.load(&nodes.fy[i]);
-                                         const Pack vx = lanes.load(&nodes.vx[i]), vy = lanes.load(&nodes.vy[i]);
-                                         const Pack dx = fx * step, dy = fy * step;
-                                         lanes.store(&nodes.vx[i], vx + dx);
-                                         lanes.store(&nodes.vy[i], vy + dy);
-                                         const Pack mean_x = vx + half * dx, mean_y = vy + half * dy;
-                                         const Pack w = lanes.load(&weight[i]);
-                                         return std::array{m * (dx * mean_x + dy * mean_y), w * mean_x, w * mean_y,
-                                                           damping.taken(fx, vx) * mean_x + damping.taken(fy, vy) * mean_y};
-                                     });
-    return {s[0], {dt * s[1], dt * s[2]}, dt * s[3]};
+    const auto s = sum_over_nodes<dim + 2>(nodes,
+                                           [&](std::size_t i, const auto& lanes)
+                                           {
+                                               const Pack step = inverse_mass(nodes, i, lanes) * Pack(dt), m = lanes.load(&nodes.mass[i]);
+                                               const Pack w = lanes.load(&weight[i]);
+                                               const auto f = load(nodes.f, i, lanes), v = load(nodes.v, i, lanes);
+                                               Vec<dim, Pack> dv, mean;
+                                               std::array<Pack, dim + 2> sums;
+                                               unrolled<dim>(
+                                                   [&](auto d)
+                                                   {
+                                                       dv[d] = f[d] * step;
+                                                       lanes.store(&nodes.v[d][i], v[d] + dv[d]);
+                                                       mean[d] = v[d] + Pack(0.5) * dv[d];
+                                                       sums[d] = w * mean[d];
+                                                   });
+                                               sums[dim] = m * total<dim>([&](auto d) { return dv[d] * mean[d]; });
+                                               sums[dim + 1] = total<dim>([&](auto d) { return damping.taken(f[d], v[d]) * mean[d]; });
+                                               return sums;
+                                           });
+    Kick kick{s[dim], {}, dt * s[dim + 1]};
+    for (int d = 0; d < dim; ++d)
+        kick.transport[d] = dt * s[d];
+    return kick;
 }
 
 /// What is recorded of a support or a wall.
 struct RestraintRecord
 {
     std::string name;
-    Vec2 reaction;                     ///< on the soil [N/m]
-    std::optional<Vec2> displacement;  ///< of a wall [m]
+    Vec<2> reaction;                     ///< on the soil [N/m]
+    std::optional<Vec<2>> displacement;  ///< of a wall [m]
 };
 
 class NodeOps
 {
 public:
     /// @throws SceneError when a boundary takes no node
-    NodeOps(const Scene& scene, const Lattice& lattice);
+    NodeOps(const Scene& scene, const Lattice<2>& lattice);
 
     /// Gravity takes these masses of the nodes for those that have weight, from now on.
     void weigh_with(const std::vector<double>& mass) { weight_ = &mass; }
@@ -134,35 +140,32 @@ public:
             wall.end_step(step);
     }
     /// Gravity, the reactions of supports and walls, and damping of what is then out of balance.
-    void apply_forces(const Lattice& lattice, Nodes& nodes, const Step& step);
+    void apply_forces(const Lattice<2>& lattice, Nodes<2>& nodes, const Step& step);
     /// Supports and walls prescribe the velocity. @param counts whether the motion of the soil takes over what that changes
-    void restrain(const Lattice& lattice, const Nodes& nodes, std::vector<double>& vx, std::vector<double>& vy, bool counts = true)
+    void restrain(const Lattice<2>& lattice, const Nodes<2>& nodes, VectorField<2>& velocity, bool counts = true)
     {
         find_driven(lattice, nodes);
-        if (const double work = driven_.drive(restraints_, nodes, vx, vy); counts)
+        if (const double work = driven_.drive(restraints_, nodes, velocity); counts)
             work_.restraints += work;
     }
     /// Runs load(), which adds forces of the outside, and keeps them for their work.
     template <class Load>
-    void apply_load(const Nodes& nodes, Load&& load)
+    void apply_load(const Nodes<2>& nodes, Load&& load)
     {
-        before_x_ = nodes.fx;
-        before_y_ = nodes.fy;
-        load_x_.resize(nodes.fx.size());
-        load_y_.resize(nodes.fy.size());
+        before_ = nodes.f;
+        for (auto& component : load_)
+            component.resize(nodes.mass.size());
         load();
-        for (const auto n : nodes.active())
-        {
-            load_x_[n] += nodes.fx[n] - before_x_[n];
-            load_y_[n] += nodes.fy[n] - before_y_[n];
-        }
+        for (std::size_t d = 0; d < load_.size(); ++d)
+            for (const auto n : nodes.active())
+                load_[d][n] += nodes.f[d][n] - before_[d][n];
     }
     /// Power that hourglass control takes from the motion in the coming kick [W/m].
     void note_hourglass(double power) { power_.hourglass = power; }
     /// Accelerates, and adds up the work of all forces.
-    void kick(Nodes& nodes, double dt);
+    void kick(Nodes<2>& nodes, double dt);
     /// Work up to the time of the forces, `lag` seconds after that of the nodes' velocity.
-    NodalWork work(const Nodes& nodes, double lag) const;
+    NodalWork work(const Nodes<2>& nodes, double lag) const;
     /// The sums up to the last kick, on which no step depends.
     NodalWork& work_done() { return work_; }
     /// Of the walls: all else is as the scene says.
@@ -179,11 +182,11 @@ public:
     const std::vector<Restraint>& restraints() const { return restraints_; }
 
 private:
-    const std::vector<double>& weight_of(const Nodes& nodes) const { return weight_ ? *weight_ : nodes.mass; }
+    const std::vector<double>& weight_of(const Nodes<2>& nodes) const { return weight_ ? *weight_ : nodes.mass; }
     /// Power of the loads at the present velocity [W/m].
-    double load_power(const Nodes& nodes) const;
+    double load_power(const Nodes<2>& nodes) const;
     void add_work(const Kick& kick, double loads, double dt, NodalWork& work) const;
-    void find_driven(const Lattice& lattice, const Nodes& nodes)
+    void find_driven(const Lattice<2>& lattice, const Nodes<2>& nodes)
     {
         if (nodes.version() == seen_)
             return;
@@ -199,12 +202,12 @@ private:
     std::size_t first_wall_ = 0;
     DrivenNodes driven_;
     NodalWork work_, power_;  ///< power: of the coming step, where it is not known to the kick [W/m]
-    Vec2 gravity_now_{0, 0};
-    std::vector<double> load_x_, load_y_, before_x_, before_y_;  ///< empty in a scene without loads
-    std::size_t seen_ = 0;                                       ///< version of the nodes for which driven_ was found; 0: none
+    Vec<2> gravity_now_{0, 0};
+    VectorField<2> load_, before_;  ///< empty in a scene without loads
+    std::size_t seen_ = 0;          ///< version of the nodes for which driven_ was found; 0: none
 };
 
-inline double force_norm(const Nodes& nodes)
+inline double force_norm(const Nodes<2>& nodes)
 {
     const auto& runs = nodes.runs();
     const auto s = ordered_sum<1>(
@@ -215,8 +218,10 @@ inline double force_norm(const Nodes& nodes)
             for_each_pack(runs[r].begin, runs[r].begin + runs[r].count,
                           [&](std::size_t i, const auto& lanes)
                           {
-                              const Pack fx = lanes.keep(lanes.load(&nodes.fx[i])), fy = lanes.keep(lanes.load(&nodes.fy[i]));
-                              square += fx * fx + fy * fy;
+                              auto f = load(nodes.f, i, lanes);
+                              for (Pack& component : f)
+                                  component = lanes.keep(component);
+                              square += total<f.size()>([&](auto d) { return f[d] * f[d]; });
                           });
             return std::array<double, 1>{sum(square)};
         },
@@ -224,7 +229,7 @@ inline double force_norm(const Nodes& nodes)
     return std::sqrt(s[0]);
 }
 
-inline std::size_t nodes_with_mass(const Nodes& nodes)
+inline std::size_t nodes_with_mass(const Nodes<2>& nodes)
 {
     return static_cast<std::size_t>(
         std::count_if(nodes.active().begin(), nodes.active().end(), [&](std::uint32_t i) { return nodes.mass[i] > 0; }));

@@ -1,7 +1,7 @@
 #pragma once
 /// Velocities that supports and walls prescribe at nodes, and the force it takes.
 
-#include "core/lattice/grid.hpp"
+#include "core/lattice/nodes.hpp"
 
 #include <array>
 #include <string>
@@ -11,16 +11,16 @@ namespace testbed
 /// Two neighbouring nodes on either side of a wall's face: the velocity interpolated at the face is prescribed.
 struct FacePair
 {
-    NodeIndex low, high;
+    Index<2> low, high;
     double share;  ///< of `high` in the interpolation, in (0, 1)
     double reach =
         0;  ///< of soil whose mass sits in the middle of its points [cells]: so far beyond the nodes with mass it still lies at the face
 };
 
-/// Restrains one component, x or y, at some nodes.
+/// Restrains one component at some nodes.
 struct ComponentRestraint
 {
-    std::vector<NodeIndex> nodes;  ///< ascending
+    std::vector<Index<2>> nodes;  ///< ascending
     std::vector<FacePair> pairs;
     double velocity = 0;  ///< [m/s]
 
@@ -31,8 +31,8 @@ struct ComponentRestraint
 struct Restraint
 {
     std::string name;
-    std::array<ComponentRestraint, 2> components;  ///< x, y
-    Vec2 reaction{0, 0};  ///< on the soil, from its forces, without damping and without the confining pressure [N/m]
+    std::array<ComponentRestraint, 2> components;
+    Vec<2> reaction{0, 0};  ///< on the soil, from its forces, without damping and without the confining pressure [N/m]
 };
 
 /// What all restraints do to the nodes in use: an empty part of the lattice costs nothing. Where two prescribe, the later one does.
@@ -40,16 +40,16 @@ class DrivenNodes
 {
 public:
     /// Notes which nodes in use the restraints take.
-    void find(const std::vector<Restraint>& restraints, const Lattice& lattice, const Nodes& nodes);
+    void find(const std::vector<Restraint>& restraints, const Lattice<2>& lattice, const Nodes<2>& nodes);
 
     /// Brings the velocities to the prescribed ones: at a pair by the impulse that the face passes on to both nodes. Returns the work of
     /// what moves, impulse times its velocity [J/m].
-    double drive(const std::vector<Restraint>& restraints, const Nodes& carrier, std::vector<double>& vx, std::vector<double>& vy) const;
+    double drive(const std::vector<Restraint>& restraints, const Nodes<2>& carrier, VectorField<2>& velocity) const;
 
     /// Adds the reactions to the forces, so that the prescribed velocities stay, and notes them.
-    void react(std::vector<Restraint>& restraints, Nodes& nodes);
+    void react(std::vector<Restraint>& restraints, Nodes<2>& nodes);
     /// The same once more at the faces, without noting them. Returns their power [W/m].
-    double hold_faces(const std::vector<Restraint>& restraints, Nodes& nodes) const;
+    double hold_faces(const std::vector<Restraint>& restraints, Nodes<2>& nodes) const;
 
     /// A FacePair by the numbers of its nodes.
     struct Pair

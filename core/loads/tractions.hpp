@@ -4,6 +4,7 @@
 /// has them.
 
 #include "core/bodies/body.hpp"
+#include "core/lattice/nodes.hpp"
 #include "core/scene/geometry.hpp"
 
 namespace testbed
@@ -18,7 +19,7 @@ public:
         for (std::size_t b = 0; b < scene.bodies.size(); ++b)
         {
             const BodySpec& body = scene.bodies[b];
-            const std::vector<Vec2> initial = fill(scene, body);
+            const std::vector<Vec<2>> initial = fill(scene, body);
             for (const TractionSpec& spec : scene.tractions)
                 if (spec.body == body.name)
                     loads_.push_back(make_load(scene, spec, b, initial, first_id, constants));
@@ -27,20 +28,20 @@ public:
     }
 
     /// Adds the forces to nodes that carry mass.
-    void apply(const Lattice& lattice, const std::vector<Body>& bodies, Nodes& nodes, double t) const
+    void apply(const Lattice<2>& lattice, const std::vector<Body>& bodies, Nodes<2>& nodes, double t) const
     {
         for (const Load& load : loads_)
         {
-            const Points& q = bodies[load.body].points;
+            const Points<2>& q = bodies[load.body].points;
             for (std::size_t p = 0; p < q.count; ++p)
             {
-                const Vec2& X = load.initial[q.id[p] - load.first_id];
+                const Vec<2>& X = load.initial[q.id[p] - load.first_id];
                 if (X[load.normal] < load.from || X[load.normal] > load.to)
                     continue;
-                Vec2 surface{q.x[p], q.y[p]};
-                const double half = q.half_x.active() ? (load.normal == 0 ? q.half_x : q.half_y)[p] : 0.5 * load.width;
+                Vec<2> surface{q.x[0][p], q.x[1][p]};
+                const double half = q.half_width[0].active() ? q.half_width[load.normal][p] : 0.5 * load.width;
                 surface[load.normal] += load.outward * half;
-                const Vec2 traction = load.traction({X[0], X[1], q.x[p], q.y[p], t});
+                const Vec<2> traction = load.traction({X[0], X[1], q.x[0][p], q.x[1][p], t});
                 give(lattice, surface, {load.width * traction[0], load.width * traction[1]}, nodes);
             }
         }
@@ -53,11 +54,11 @@ private:
         double outward, from, to;  ///< initial coordinates of the row of points
         double width;              ///< of the face that each point stands for [m]
         std::uint32_t first_id;
-        std::vector<Vec2> initial;  ///< of all points of the body, by id
+        std::vector<Vec<2>> initial;  ///< of all points of the body, by id
         VectorExpression traction;
     };
 
-    static Load make_load(const Scene& scene, const TractionSpec& spec, std::size_t b, const std::vector<Vec2>& initial,
+    static Load make_load(const Scene& scene, const TractionSpec& spec, std::size_t b, const std::vector<Vec<2>>& initial,
                           std::uint32_t first_id, const Constants& constants)
     {
         const BodySpec& body = scene.bodies[b];
@@ -69,10 +70,10 @@ private:
     }
 
     /// Bilinear, over the nodes that carry mass: a surface that has just entered a cell has not reached its far nodes.
-    static void give(const Lattice& lattice, const Vec2& place, const Vec2& force, Nodes& nodes)
+    static void give(const Lattice<2>& lattice, const Vec<2>& place, const Vec<2>& force, Nodes<2>& nodes)
     {
         const double cx = (place[0] - lattice.origin[0]) / lattice.cell_size, cy = (place[1] - lattice.origin[1]) / lattice.cell_size;
-        if (!(cx >= -1 && cx < lattice.nx + 1 && cy >= -1 && cy < lattice.ny + 1))
+        if (!(cx >= -1 && cx < lattice.size[0] + 1 && cy >= -1 && cy < lattice.size[1] + 1))
             return;  // the point itself will be told to have left
         const int i = static_cast<int>(std::floor(cx)), j = static_cast<int>(std::floor(cy));
         const double a = cx - i, b = cy - j;
@@ -81,16 +82,16 @@ private:
         double total = 0;
         for (int k = 0; k < 4; ++k)
         {
-            if (!lattice.has_node(i + (k & 1), j + (k >> 1)))
+            if (!lattice.has_node({i + (k & 1), j + (k >> 1)}))
                 continue;
-            node[k] = lattice.node(i + (k & 1), j + (k >> 1));
+            node[k] = lattice.node({i + (k & 1), j + (k >> 1)});
             weight[k] = nodes.mass[node[k]] > 0 ? ((k & 1) ? a : 1 - a) * ((k >> 1) ? b : 1 - b) : 0;
             total += weight[k];
         }
         for (int k = 0; k < 4 && total > 0; ++k)
         {
-            nodes.fx[node[k]] += force[0] * weight[k] / total;
-            nodes.fy[node[k]] += force[1] * weight[k] / total;
+            nodes.f[0][node[k]] += force[0] * weight[k] / total;
+            nodes.f[1][node[k]] += force[1] * weight[k] / total;
         }
     }
 

@@ -25,7 +25,7 @@ double reach_of(const Scene& scene)
 }
 }  // namespace
 
-Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice) : spec_(spec), lattice_(lattice), reach_(reach_of(scene))
+Wall::Wall(const WallSpec& spec, const Scene& scene, const Lattice<2>& lattice) : spec_(spec), lattice_(lattice), reach_(reach_of(scene))
 {
     if (spec.velocity)
         velocity_.emplace(*spec.velocity, scene.expression_constants());
@@ -43,7 +43,7 @@ bool Wall::begin_step(const Step& step, Restraint& restraint)
     }
     if (!velocity_)
         return others;
-    const Vec2 v = (*velocity_)({.t = step.t + 0.5 * step.dt});
+    const Vec<2> v = (*velocity_)({.t = step.t + 0.5 * step.dt});
     travel_rate_ = v;
     for (std::size_t k = 0; k < 2; ++k)
         restraint.components[k].velocity = fixes(spec_.fix, k) ? v[k] : 0;
@@ -71,7 +71,7 @@ Wall::Region Wall::region(double t) const
 }
 
 /// Whether a place in the wall lies in its open door.
-bool Wall::is_open_at(const Region& region, const Vec2& place) const
+bool Wall::is_open_at(const Region& region, const Vec<2>& place) const
 {
     if (!region.door_open)
         return false;
@@ -94,12 +94,12 @@ void Wall::take_nodes(const Region& region, Restraint& restraint)
     const double L = lattice_.cell_size;
     const auto first = [&](std::size_t k) { return static_cast<int>(std::ceil((region.min[k] - lattice_.origin[k]) / L - slack)); };
     const auto last = [&](std::size_t k) { return static_cast<int>(std::floor((region.max[k] - lattice_.origin[k]) / L + slack)); };
-    std::vector<NodeIndex> nodes;
+    std::vector<Index<2>> nodes;
     // a wall that ends at the edge of the lattice takes the ring around it, too
     const auto low = [&](std::size_t k) { return first(k) <= 0 ? -1 : first(k); };
     const auto high = [&](std::size_t k, int n) { return last(k) >= n ? n + 1 : last(k); };
-    for (int j = low(1); j <= high(1, lattice_.ny); ++j)
-        for (int i = low(0); i <= high(0, lattice_.nx); ++i)
+    for (int j = low(1); j <= high(1, lattice_.size[1]); ++j)
+        for (int i = low(0); i <= high(0, lattice_.size[0]); ++i)
             if (!is_open_at(region, lattice_.node_position({i, j})))
                 nodes.push_back({i, j});
     if (taken_)
@@ -108,7 +108,7 @@ void Wall::take_nodes(const Region& region, Restraint& restraint)
     for (std::size_t k = 0; k < 2; ++k)
     {
         restraint.components[k].pairs.clear();
-        restraint.components[k].nodes = fixes(spec_.fix, k) ? nodes : std::vector<NodeIndex>{};
+        restraint.components[k].nodes = fixes(spec_.fix, k) ? nodes : std::vector<Index<2>>{};
     }
 }
 
@@ -122,8 +122,8 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
         const std::size_t along = 1 - normal;
         const auto cells = [&](double x, std::size_t k) { return (x - lattice_.origin[k]) / L; };
         const int from = std::max(0, static_cast<int>(std::ceil(cells(region.min[along], along) - slack)));
-        const int to =
-            std::min(along == 0 ? lattice_.nx : lattice_.ny, static_cast<int>(std::floor(cells(region.max[along], along) + slack)));
+        const int to = std::min(along == 0 ? lattice_.size[0] : lattice_.size[1],
+                                static_cast<int>(std::floor(cells(region.max[along], along) + slack)));
         const bool is_plate = region.min[normal] == region.max[normal];
         if (!is_plate && region.min[along] == region.max[along])
             continue;  // the thin ends of a plate
@@ -135,9 +135,9 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
             for (int k = from; k <= to; ++k)
             {
                 const int line = static_cast<int>(below);
-                const NodeIndex low = normal == 0 ? NodeIndex{line, k} : NodeIndex{k, line};
-                const NodeIndex high = normal == 0 ? NodeIndex{line + 1, k} : NodeIndex{k, line + 1};
-                Vec2 place = lattice_.node_position(low);
+                const Index<2> low = normal == 0 ? Index<2>{line, k} : Index<2>{k, line};
+                const Index<2> high = normal == 0 ? Index<2>{line + 1, k} : Index<2>{k, line + 1};
+                Vec<2> place = lattice_.node_position(low);
                 place[normal] = face;
                 if (!is_open_at(region, place))
                     pairs.push_back({low, high, share, reach_});
@@ -146,7 +146,7 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
                 break;
         }
     }
-    std::vector<NodeIndex> at_faces;
+    std::vector<Index<2>> at_faces;
     for (const FacePair& p : pairs)
         at_faces.insert(at_faces.end(), {p.low, p.high});
     std::sort(at_faces.begin(), at_faces.end());
@@ -156,14 +156,14 @@ void Wall::take_faces(const Region& region, Restraint& restraint) const
             continue;
         ComponentRestraint& component = restraint.components[k];
         component.pairs = pairs;
-        std::erase_if(component.nodes, [&](const NodeIndex& n) { return std::binary_search(at_faces.begin(), at_faces.end(), n); });
+        std::erase_if(component.nodes, [&](const Index<2>& n) { return std::binary_search(at_faces.begin(), at_faces.end(), n); });
     }
 }
 
 void Wall::check_on_lattice(const Region& region, double t) const
 {
     const double reach = slack * lattice_.cell_size;
-    const Vec2 extent{lattice_.nx * lattice_.cell_size, lattice_.ny * lattice_.cell_size};
+    const Vec<2> extent{lattice_.size[0] * lattice_.cell_size, lattice_.size[1] * lattice_.cell_size};
     for (std::size_t k = 0; k < 2; ++k)
         if (region.min[k] < lattice_.origin[k] - reach || region.max[k] > lattice_.origin[k] + extent[k] + reach)
             throw Diverged(fmt::format("wall '{}' left the lattice at t = {:.6g} s after a travel of ({:.4g}, {:.4g}) m", spec_.name, t,

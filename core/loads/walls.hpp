@@ -11,7 +11,7 @@ namespace testbed
 class Wall
 {
 public:
-    Wall(const WallSpec& spec, const Scene& scene, const Lattice& lattice);
+    Wall(const WallSpec& spec, const Scene& scene, const Lattice<2>& lattice);
 
     /// Sets the restraint to the nodes that the wall covers at the start of the step, and to its velocity in its middle. Returns
     /// whether they are others than before.
@@ -39,30 +39,30 @@ public:
     }
 
     /// Since the start [m].
-    const Vec2& displacement() const { return travel_; }
+    const Vec<2>& displacement() const { return travel_; }
     /// Nodes that the last begin_step() added; not those of the start.
-    const std::vector<NodeIndex>& new_nodes() const { return new_nodes_; }
+    const std::vector<Index<2>>& new_nodes() const { return new_nodes_; }
 
 private:
     struct Region
     {
-        Vec2 min{0, 0}, max{0, 0};
+        Vec<2> min{0, 0}, max{0, 0};
         bool door_open = false;
         bool operator==(const Region&) const = default;
     };
     Region region(double t) const;
-    bool is_open_at(const Region& region, const Vec2& place) const;
+    bool is_open_at(const Region& region, const Vec<2>& place) const;
     void take(const Region& region, Restraint& restraint);
     void take_nodes(const Region& region, Restraint& restraint);
     void take_faces(const Region& region, Restraint& restraint) const;
     void check_on_lattice(const Region& region, double t) const;
 
     WallSpec spec_;
-    Lattice lattice_;
+    Lattice<2> lattice_;
     double reach_;  ///< of the soil beyond the nodes that its mass reaches [cells]
     std::optional<VectorExpression> velocity_;
-    Vec2 travel_{0, 0}, travel_rate_{0, 0};
+    Vec<2> travel_{0, 0}, travel_rate_{0, 0};
     std::optional<Region> taken_;
-    std::vector<NodeIndex> covered_, new_nodes_;
+    std::vector<Index<2>> covered_, new_nodes_;
 };
 }  // namespace testbed

@@ -41,7 +41,7 @@ inline double gradient_stiffness(const ElasticModuli& m)
     return 2 * m.shear() + 2 * std::max(m.lame(), 0.0);
 }
 /// Young's modulus of point p over that of its body's material.
-inline double stiffness_ratio(const Points& q, std::size_t p)
+inline double stiffness_ratio(const Points<2>& q, std::size_t p)
 {
     return q.stiffness.active() ? q.stiffness[p] : 1.0;
 }
@@ -53,24 +53,24 @@ struct ElasticPart
     ElasticModuli moduli;
 
     /// Of compression, at the stiffest point [m/s].
-    double wave_speed(const Points& q) const { return std::sqrt(moduli.constrained() * q.initial_volume / q.mass); }
+    double wave_speed(const Points<2>& q) const { return std::sqrt(moduli.constrained() * q.initial_volume / q.mass); }
 
     /// That is given back, per current volume, of a stress with out-of-plane component szz at a point with the stiffness of the law
     /// [J/m^3].
-    double energy_density(const SymTensor<>& s, double szz) const
+    double energy_density(const SymTensor<2>& s, double szz) const
     {
         const double normal = s.xx * s.xx + s.yy * s.yy + szz * szz;
         const double mixed = s.xx * s.yy + (s.xx + s.yy) * szz;
         return (normal - 2 * moduli.poissons_ratio() * mixed) / (2 * moduli.youngs_modulus()) + s.xy * s.xy / (2 * moduli.shear());
     }
     /// Of a stress in the plane that is all elastic [Pa].
-    double elastic_out_of_plane_stress(const SymTensor<>& s) const { return moduli.poissons_ratio() * (s.xx + s.yy); }
+    double elastic_out_of_plane_stress(const SymTensor<2>& s) const { return moduli.poissons_ratio() * (s.xx + s.yy); }
 };
 
 struct NoRotation
 {
     template <class T>
-    TESTBED_INLINE static void rotate(SymTensor<T>&, T)
+    TESTBED_INLINE static void rotate(SymTensor<2, T>&, T)
     {
     }
 };
@@ -79,7 +79,7 @@ struct NoRotation
 struct JaumannRotation
 {
     template <class T>
-    TESTBED_INLINE static void rotate(SymTensor<T>& s, T angle)
+    TESTBED_INLINE static void rotate(SymTensor<2, T>& s, T angle)
     {
         const T dxx = T(-2.0) * angle * s.xy, dxy = angle * (s.xx - s.yy);
         s.xx += dxx;
@@ -92,7 +92,7 @@ struct JaumannRotation
 struct ExactRotation
 {
     template <class T>
-    TESTBED_INLINE static void rotate(SymTensor<T>& s, T angle)
+    TESTBED_INLINE static void rotate(SymTensor<2, T>& s, T angle)
     {
         const T square = angle * angle;
         const T t = angle * (T(0.5) + square * (T(1.0 / 24) + square * T(1.0 / 240)));  // tan(angle / 2)
@@ -113,24 +113,24 @@ struct Hypoelastic : ElasticPart
     template <class T>
     struct State
     {
-        SymTensor<T> stress;
+        SymTensor<2, T> stress;
     };
 
     /// The fields of a point beyond its stress in the plane: none.
-    void allocate(Points&) const {}
-    double out_of_plane_stress(const Points& q, std::size_t p) const { return elastic_out_of_plane_stress({q.sxx[p], q.syy[p], q.sxy[p]}); }
+    void allocate(Points<2>&) const {}
+    double out_of_plane_stress(const Points<2>& q, std::size_t p) const { return elastic_out_of_plane_stress(q.stress_at(p)); }
 
     /// The pure point function: stress after the displacement gradient increment d.
     template <class T>
-    TESTBED_INLINE void update(State<T>& state, const Gradient<T>& d) const
+    TESTBED_INLINE void update(State<T>& state, const Gradient<2, T>& d) const
     {
         update(state, d, T(1.0));
     }
 
     template <class T>
-    TESTBED_INLINE void update(State<T>& state, const Gradient<T>& d, T stiffness) const
+    TESTBED_INLINE void update(State<T>& state, const Gradient<2, T>& d, T stiffness) const
     {
-        SymTensor<T>& s = state.stress;
+        SymTensor<2, T>& s = state.stress;
         Rotation::rotate(s, d.rotation());
         const T lame = stiffness * T(moduli.lame()), shear = stiffness * T(moduli.shear());
         s.xx += lame * d.trace() + T(2.0) * shear * d.xx;
@@ -140,7 +140,7 @@ struct Hypoelastic : ElasticPart
 
     /// The same on the points [p, p + lanes).
     template <class Lanes>
-    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    TESTBED_INLINE void update(Points<2>& q, std::size_t p, const Lanes& lanes, const Gradient<2, Pack>& d) const
     {
         State<Pack> state = load(q, p, lanes);
         update(state, d);
@@ -149,16 +149,14 @@ struct Hypoelastic : ElasticPart
 
 protected:
     template <class Lanes>
-    static State<Pack> load(const Points& q, std::size_t p, const Lanes& lanes)
+    static State<Pack> load(const Points<2>& q, std::size_t p, const Lanes& lanes)
     {
-        return {{lanes.load(&q.sxx[p]), lanes.load(&q.syy[p]), lanes.load(&q.sxy[p])}};
+        return {q.stress_at(p, lanes)};
     }
     template <class Lanes>
-    static void store(Points& q, std::size_t p, const Lanes& lanes, const State<Pack>& state)
+    static void store(Points<2>& q, std::size_t p, const Lanes& lanes, const State<Pack>& state)
     {
-        lanes.store(&q.sxx[p], state.stress.xx);
-        lanes.store(&q.syy[p], state.stress.yy);
-        lanes.store(&q.sxy[p], state.stress.xy);
+        q.set_stress(p, lanes, state.stress);
     }
 };
 
@@ -168,10 +166,10 @@ struct VaryingStiffness : Law
 {
     using Law::update;
 
-    void allocate(Points& q) const { q.stiffness.activate(q.count); }
+    void allocate(Points<2>& q) const { q.stiffness.activate(q.count); }
 
     template <class Lanes>
-    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    TESTBED_INLINE void update(Points<2>& q, std::size_t p, const Lanes& lanes, const Gradient<2, Pack>& d) const
     {
         auto state = Law::load(q, p, lanes);
         Law::update(state, d, lanes.load(&q.stiffness[p]));

@@ -30,28 +30,29 @@ struct MohrCoulomb : ElasticPart
     template <class T>
     struct State
     {
-        SymTensor<T> stress;
+        SymTensor<2, T> stress;
         T stress_zz{}, plastic_shear_strain{};
     };
 
-    void allocate(Points& q) const
+    void allocate(Points<2>& q) const
     {
         q.szz.activate(q.count);
         q.plastic_shear.activate(q.count);
     }
-    double out_of_plane_stress(const Points& q, std::size_t p) const { return q.szz[p]; }
+    double out_of_plane_stress(const Points<2>& q, std::size_t p) const { return q.szz[p]; }
 
     /// What is lost per volume and unit of plastic shear strain, along the flow of the face that the stress of point p lies on [J/m^3].
-    double plastic_work_per_shear(const Points& q, std::size_t p) const
+    double plastic_work_per_shear(const Points<2>& q, std::size_t p) const
     {
-        const double mean = 0.5 * (q.sxx[p] + q.syy[p]), radius = std::hypot(0.5 * (q.sxx[p] - q.syy[p]), q.sxy[p]);
+        const double mean = 0.5 * (q.stress[0][p] + q.stress[1][p]),
+                     radius = std::hypot(0.5 * (q.stress[0][p] - q.stress[1][p]), q.stress[2][p]);
         const double major = std::max(mean + radius, q.szz[p]), minor = std::min(mean - radius, q.szz[p]), sine = back.sin_psi();
         return 0.5 * (major * (1 + sine) - minor * (1 - sine));
     }
 
     /// The pure point function: stress after the displacement gradient increment d, with the law's one strength and softening by
     /// the point's own strain.
-    void update(State<double>& state, const Gradient<double>& d) const
+    void update(State<double>& state, const Gradient<2>& d) const
     {
         elastic(state, d);
         if (!inside(state, strength, state.plastic_shear_strain))
@@ -60,7 +61,7 @@ struct MohrCoulomb : ElasticPart
 
     /// The same on the points [p, p + lanes).
     template <class Lanes>
-    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    TESTBED_INLINE void update(Points<2>& q, std::size_t p, const Lanes& lanes, const Gradient<2, Pack>& d) const
     {
         update(q, p, lanes, d, Strength<Pack>{Pack(strength.cohesion), Pack(strength.sin_phi)}, LocalDriver{});
     }
@@ -74,7 +75,7 @@ protected:
         {
             return own;
         }
-        static const Field<double>& field(const Points& q) { return q.plastic_shear; }
+        static const Field<double>& field(const Points<2>& q) { return q.plastic_shear; }
     };
     /// A field that stays as it is within a step: the cohesion is known before the return.
     struct NonlocalDriver
@@ -84,11 +85,11 @@ protected:
         {
             return given;
         }
-        static const Field<double>& field(const Points& q) { return q.softening_strain; }
+        static const Field<double>& field(const Points<2>& q) { return q.softening_strain; }
     };
 
     template <class T>
-    TESTBED_INLINE void elastic(State<T>& state, const Gradient<T>& d) const
+    TESTBED_INLINE void elastic(State<T>& state, const Gradient<2, T>& d) const
     {
         HypoelasticExactRotation::State<T> in_plane{state.stress};
         HypoelasticExactRotation{{moduli}}.update(in_plane, d);
@@ -101,7 +102,7 @@ protected:
     TESTBED_INLINE decltype(T{} <= T{}) inside(const State<T>& state, const Strength<T>& strength, const T& driver) const
     {
         using std::sqrt;
-        const SymTensor<T>& s = state.stress;
+        const SymTensor<2, T>& s = state.stress;
         const T mean = T(0.5) * (s.xx + s.yy), half = T(0.5) * (s.xx - s.yy);
         const T radius = sqrt(half * half + s.xy * s.xy);
         const T high = max(mean + radius, state.stress_zz), low = min(mean - radius, state.stress_zz);
@@ -114,7 +115,7 @@ protected:
     template <class Driver>
     void plastic(State<double>& state, const Strength<>& point, Driver, double given = 0) const
     {
-        SymTensor<>& s = state.stress;
+        SymTensor<2>& s = state.stress;
         const double mean = 0.5 * (s.xx + s.yy), half = 0.5 * (s.xx - s.yy), radius = std::hypot(half, s.xy);
         const double high = mean + radius, low = mean - radius;
         // sorted: where the in-plane stresses and s_zz stand
@@ -149,7 +150,7 @@ protected:
     template <class Driver>
     TESTBED_INLINE Mask return_to_face(State<Pack>& state, const Strength<Pack>& point, Driver, Pack given, Mask yields) const
     {
-        SymTensor<Pack>& s = state.stress;
+        SymTensor<2, Pack>& s = state.stress;
         const Pack mean = Pack(0.5) * (s.xx + s.yy), half = Pack(0.5) * (s.xx - s.yy), radius = sqrt(half * half + s.xy * s.xy);
         const Pack high = mean + radius, low = mean - radius, zz = state.stress_zz;
         const Mask zz_first = zz > high, zz_last = zz < low;
@@ -194,11 +195,10 @@ protected:
     }
 
     template <class Lanes, class Driver>
-    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d, const Strength<Pack>& point,
+    TESTBED_INLINE void update(Points<2>& q, std::size_t p, const Lanes& lanes, const Gradient<2, Pack>& d, const Strength<Pack>& point,
                                Driver driver) const
     {
-        State<Pack> state{
-            {lanes.load(&q.sxx[p]), lanes.load(&q.syy[p]), lanes.load(&q.sxy[p])}, lanes.load(&q.szz[p]), lanes.load(&q.plastic_shear[p])};
+        State<Pack> state{q.stress_at(p, lanes), lanes.load(&q.szz[p]), lanes.load(&q.plastic_shear[p])};
         elastic(state, d);
         const Pack given = lanes.load(&Driver::field(q)[p]);
         if (const Mask yields = lanes.keep(!inside(state, point, given)); stdx::any_of(yields))
@@ -207,9 +207,7 @@ protected:
                 state = plastic_lanes(state, point, driver, given, rest);
             lanes.store(&q.plastic_shear[p], state.plastic_shear_strain);
         }
-        lanes.store(&q.sxx[p], state.stress.xx);
-        lanes.store(&q.syy[p], state.stress.yy);
-        lanes.store(&q.sxy[p], state.stress.xy);
+        q.set_stress(p, lanes, state.stress);
         lanes.store(&q.szz[p], state.stress_zz);
     }
 };
@@ -220,7 +218,7 @@ struct MohrCoulombField : MohrCoulomb
 {
     using MohrCoulomb::update;
 
-    void allocate(Points& q) const
+    void allocate(Points<2>& q) const
     {
         MohrCoulomb::allocate(q);
         if constexpr (varying_strength)
@@ -233,7 +231,7 @@ struct MohrCoulombField : MohrCoulomb
     }
 
     template <class Lanes>
-    TESTBED_INLINE void update(Points& q, std::size_t p, const Lanes& lanes, const Gradient<Pack>& d) const
+    TESTBED_INLINE void update(Points<2>& q, std::size_t p, const Lanes& lanes, const Gradient<2, Pack>& d) const
     {
         Strength<Pack> point{Pack(strength.cohesion), Pack(strength.sin_phi)};
         if constexpr (varying_strength)

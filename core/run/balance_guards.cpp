@@ -144,7 +144,7 @@ class MomentumGuard final : public Remembering<MomentumGuard>
 public:
     void watch(const GuardSample& s, const Solver&) override
     {
-        const Vec2& p = s.motion.momentum;
+        const Vec<2>& p = s.motion.momentum;
         at_start_ = at_start_.value_or(p);
         change_ = std::max(change_, std::hypot(p[0] - (*at_start_)[0], p[1] - (*at_start_)[1]));
         scale_ = std::max(scale_, std::sqrt(2 * s.point_motion.mass * std::max(0.0, s.point_motion.kinetic_energy)));
@@ -166,7 +166,7 @@ public:
     }
 
 private:
-    std::optional<Vec2> at_start_{};
+    std::optional<Vec<2>> at_start_{};
     double change_ = 0, scale_ = 0;
 };
 

@@ -46,19 +46,19 @@ double full_mass(const std::vector<Body>& bodies, double cell_size)
 }
 }  // namespace
 
-double checkerboard_share(const Lattice& lattice, const Nodes& nodes)
+double checkerboard_share(const Lattice<2>& lattice, const Nodes<2>& nodes)
 {
     double pattern = 0, all = 0;
     const std::size_t above = lattice.node_stride();
     for (const auto n : nodes.active())
     {
-        if (!lattice.has_node(lattice.node_i(n) + 1, lattice.node_j(n) + 1))
+        if (!lattice.has_node({lattice.node_index(n)[0] + 1, lattice.node_index(n)[1] + 1}))
             continue;
         const std::array<std::size_t, 4> corner{n, n + 1, n + above, n + above + 1};
         const auto light = [&](std::size_t k) { return !(nodes.mass[k] > 0); };
         if (std::any_of(corner.begin(), corner.end(), light))
             continue;
-        for (const auto* v : {&nodes.vx, &nodes.vy})
+        for (const auto* v : {&nodes.v[0], &nodes.v[1]})
         {
             const double h = (*v)[corner[0]] - (*v)[corner[1]] - (*v)[corner[2]] + (*v)[corner[3]];
             double square = 0;
@@ -71,11 +71,11 @@ double checkerboard_share(const Lattice& lattice, const Nodes& nodes)
     return all > 0 ? pattern / all : 0;
 }
 
-double mass_of_fastest(const Nodes& nodes, double full)
+double mass_of_fastest(const Nodes<2>& nodes, double full)
 {
     double fastest = 0, mass = full;
     for (const auto n : nodes.active())
-        if (const double square = nodes.vx[n] * nodes.vx[n] + nodes.vy[n] * nodes.vy[n]; nodes.mass[n] > 0 && square > fastest)
+        if (const double square = nodes.v[0][n] * nodes.v[0][n] + nodes.v[1][n] * nodes.v[1][n]; nodes.mass[n] > 0 && square > fastest)
         {
             fastest = square;
             mass = nodes.mass[n];
@@ -83,7 +83,7 @@ double mass_of_fastest(const Nodes& nodes, double full)
     return mass / full;
 }
 
-double stress_oscillation(const std::vector<Body>& bodies, const Lattice& lattice)
+double stress_oscillation(const std::vector<Body>& bodies, const Lattice<2>& lattice)
 {
     double within = 0, total = 0;
     for (const Body& body : bodies)
@@ -101,12 +101,12 @@ double stress_oscillation(const std::vector<Body>& bodies, const Lattice& lattic
         };
         std::map<std::pair<double, double>, Sums> cells;
         Sums all;
-        const Points& q = body.points;
+        const Points<2>& q = body.points;
         for (std::size_t p = 0; p < q.count; ++p)
         {
-            const double mean = 0.5 * (q.sxx[p] + q.syy[p]);
-            cells[{std::floor((q.x[p] - lattice.origin[0]) / lattice.cell_size),
-                   std::floor((q.y[p] - lattice.origin[1]) / lattice.cell_size)}]
+            const double mean = 0.5 * (q.stress[0][p] + q.stress[1][p]);
+            cells[{std::floor((q.x[0][p] - lattice.origin[0]) / lattice.cell_size),
+                   std::floor((q.x[1][p] - lattice.origin[1]) / lattice.cell_size)}]
                 .add(mean);
             all.add(mean);
         }

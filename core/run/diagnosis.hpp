@@ -21,9 +21,9 @@ struct Diagnosis
 Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& facts);
 
 /// Share of the nodal kinetic energy in the pattern (+1, -1, -1, +1) of the cells, which has no strain, 0 to 1.
-double checkerboard_share(const Lattice& lattice, const Nodes& nodes);
+double checkerboard_share(const Lattice<2>& lattice, const Nodes<2>& nodes);
 /// Mass of the fastest node over that of a full one.
-double mass_of_fastest(const Nodes& nodes, double full);
+double mass_of_fastest(const Nodes<2>& nodes, double full);
 /// Standard deviation of the mean stress within cells over that of all points, 0 to 1: near 1 when neighbours have nothing in common.
-double stress_oscillation(const std::vector<Body>& bodies, const Lattice& lattice);
+double stress_oscillation(const std::vector<Body>& bodies, const Lattice<2>& lattice);
 }  // namespace testbed

@@ -61,13 +61,13 @@ void add_stiffness(ElementSystem& system, const std::array<double, m>& xx, const
 }
 
 /// Marks the components that supports and walls prescribe.
-inline void fix(ElementSystem& system, const std::vector<Restraint>& restraints, const Lattice& lattice)
+inline void fix(ElementSystem& system, const std::vector<Restraint>& restraints, const Lattice<2>& lattice)
 {
     for (const Restraint& restraint : restraints)
         for (std::size_t k = 0; k < 2; ++k)
-            for (const NodeIndex& n : restraint.components[k].nodes)
-                if (lattice.has_node(n.i, n.j))
-                    system.is_fixed[2 * lattice.node(n.i, n.j) + k] = 1;
+            for (const Index<2>& n : restraint.components[k].nodes)
+                if (lattice.has_node(n))
+                    system.is_fixed[2 * lattice.node(n) + k] = 1;
 }
 
 /// Largest eigenvalue of X M^-1 K with X self-adjoint in M: Lanczos' iteration in the energy product of K. From below, right to

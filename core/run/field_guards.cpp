@@ -37,13 +37,13 @@ public:
             error_ = stress_error(solver.bodies(), lattice_, mesh_);
         else if (is_free_)  // after a blow on a wall it is no error of the method
         {
-            const Vec2& p = s.point_motion.momentum;
-            const Vec2 frame{p[0] / s.point_motion.mass, p[1] / s.point_motion.mass};
+            const Vec<2>& p = s.point_motion.momentum;
+            const Vec<2> frame{p[0] / s.point_motion.mass, p[1] / s.point_motion.mass};
             const double noise = unresolved_energy(solver.bodies(), lattice_, mesh_,
                                                    [&](std::size_t b, std::size_t k)
                                                    {
-                                                       const Vec2 v = solver.velocity(b, k);
-                                                       return Vec2{v[0] - frame[0], v[1] - frame[1]};
+                                                       const Vec<2> v = solver.velocity(b, k);
+                                                       return Vec<2>{v[0] - frame[0], v[1] - frame[1]};
                                                    });
             if (noise > limits::worth_noise * most_ && noise > limits::rounding * s.point_motion.kinetic_energy)
                 share_ = noise / std::max(energy(s), 1e-300);
@@ -76,17 +76,17 @@ private:
     }
 
     bool is_free_;
-    Lattice lattice_;
+    Lattice<2> lattice_;
     double mesh_, most_ = 0, error_ = 0, share_ = 0;
 };
 
 using CellKey = std::pair<int, int>;
 
-CellKey cell_of(const Lattice& lattice, const Points& q, std::size_t p)
+CellKey cell_of(const Lattice<2>& lattice, const Points<2>& q, std::size_t p)
 {
     const auto line = [&](double x, std::size_t k)
     { return static_cast<int>(std::clamp(std::floor((x - lattice.origin[k]) / lattice.cell_size + bin_tolerance), -1e9, 1e9)); };
-    return {line(q.x[p], 0), line(q.y[p], 1)};
+    return {line(q.x[0][p], 0), line(q.x[1][p], 1)};
 }
 
 /// Points that belong to one cell as a whole carry their stress along when they cross a lattice line, and the nodal force jumps. What came
@@ -100,7 +100,7 @@ public:
     {
         if (at_start_.empty())
             for_each_point(solver,
-                           [&](const Points& q, std::size_t p)
+                           [&](const Points<2>& q, std::size_t p)
                            {
                                at_start_.resize(std::max(at_start_.size(), std::size_t{q.id[p]} + 1));
                                at_start_[q.id[p]] = cell_of(lattice_, q, p);
@@ -111,7 +111,7 @@ public:
         if (!is_static(s))
             return;
         double crossed = 0;
-        for_each_point(solver, [&](const Points& q, std::size_t p)
+        for_each_point(solver, [&](const Points<2>& q, std::size_t p)
                        { crossed += cell_of(lattice_, q, p) != at_start_[q.id[p]] ? q.current_volume(p) : 0; });
         share_ = crossed / s.points.volume;
         if (shares_cells_)
@@ -155,7 +155,7 @@ private:
         for (const Body& body : bodies)
             for (std::size_t p = 0; p < body.points.count; ++p)
             {
-                const Points& q = body.points;
+                const Points<2>& q = body.points;
                 const double energy = strain_energy(body.material, q, p);
                 sum += energy * std::abs(q.current_volume(p) / q.initial_volume - 1);
                 weight += energy;
@@ -163,7 +163,7 @@ private:
         return weight > 0 ? sum / weight : 0;
     }
 
-    Lattice lattice_;
+    Lattice<2> lattice_;
     bool shares_cells_;
     std::vector<CellKey> at_start_;  ///< by id, which counts on from body to body
     double share_ = 0, squeezed_ = 0;
@@ -219,7 +219,7 @@ public:
     }
 
 private:
-    Lattice lattice_;
+    Lattice<2> lattice_;
     double share_ = 0, contrast_ = 0;
 };
 }  // namespace

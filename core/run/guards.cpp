@@ -124,7 +124,7 @@ public:
             return;
         for (const Body& body : solver.bodies())
         {
-            const Points& q = body.points;
+            const Points<2>& q = body.points;
             const ElasticModuli m = moduli(body.material);
             largest_ = std::max(largest_,
                                 parallel_max(q.count,
@@ -132,10 +132,10 @@ public:
                                              {
                                                  const double softer = stiffness_ratio(q, p);
                                                  const double szz = out_of_plane_stress(body.material, q, p);
-                                                 const double mean = m.poissons_ratio() * (q.sxx[p] + q.syy[p] + szz);
-                                                 const double a = (1 + m.poissons_ratio()) * q.sxx[p] - mean,
-                                                              b = (1 + m.poissons_ratio()) * q.syy[p] - mean,
-                                                              c = (1 + m.poissons_ratio()) * q.sxy[p];
+                                                 const double mean = m.poissons_ratio() * (q.stress[0][p] + q.stress[1][p] + szz);
+                                                 const double a = (1 + m.poissons_ratio()) * q.stress[0][p] - mean,
+                                                              b = (1 + m.poissons_ratio()) * q.stress[1][p] - mean,
+                                                              c = (1 + m.poissons_ratio()) * q.stress[2][p];
                                                  return std::max({std::abs(a), std::abs(b), std::abs(c)}) / (m.youngs_modulus() * softer);
                                              }));
         }

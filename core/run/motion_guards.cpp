@@ -18,7 +18,7 @@ public:
     void watch(const GuardSample& s, const Solver& solver) override
     {
         const double g = std::hypot(gravity_.acceleration[0], gravity_.acceleration[1]);
-        const Vec2 down{gravity_.acceleration[0] / g, gravity_.acceleration[1] / g};
+        const Vec<2> down{gravity_.acceleration[0] / g, gravity_.acceleration[1] / g};
         body_.add(s.t, (down[0] * s.points.moment[0] + down[1] * s.points.moment[1]) / s.points.mass, s.t >= gravity_.ramp);
         constexpr std::size_t few = 1000;  // points: a look at all of them costs next to nothing
         std::size_t points = 0;
@@ -29,7 +29,7 @@ public:
         double top = std::numeric_limits<double>::infinity();
         for (const Body& body : solver.bodies())
             for (std::size_t p = 0; p < body.points.count; ++p)
-                top = std::min(top, down[0] * body.points.x[p] + down[1] * body.points.y[p]);
+                top = std::min(top, down[0] * body.points.x[0][p] + down[1] * body.points.x[1][p]);
         top_.add(s.t, top, s.t >= gravity_.ramp);
     }
     std::optional<Finding> finding(bool) const override
@@ -110,8 +110,8 @@ public:
                 wall.displacement = *r.displacement;
             if (is_new || !(s.t > t_))
                 continue;
-            const Vec2 v{((*r.displacement)[0] - wall.displacement[0]) / (s.t - t_),
-                         ((*r.displacement)[1] - wall.displacement[1]) / (s.t - t_)};
+            const Vec<2> v{((*r.displacement)[0] - wall.displacement[0]) / (s.t - t_),
+                           ((*r.displacement)[1] - wall.displacement[1]) / (s.t - t_)};
             const double speed = std::hypot(v[0], v[1]);
             swings_ = swings_ || v[0] * wall.way[0] + v[1] * wall.way[1] < 0 || (wall.slowed && speed > 0.5 * wall.fastest);
             wall.slowed = wall.slowed || speed < 0.5 * wall.fastest;
@@ -155,7 +155,7 @@ public:
 private:
     struct Wall
     {
-        Vec2 displacement{0, 0}, way{0, 0};  ///< last velocity that was not zero
+        Vec<2> displacement{0, 0}, way{0, 0};  ///< last velocity that was not zero
         double fastest = 0;
         bool slowed = false;  ///< to less than half of that
     };

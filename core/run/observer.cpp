@@ -26,13 +26,13 @@ Observer::Observer(const Scene& scene, const Solver& solver)
     if (scene.gravity)
         gravity_ = make_gravity(*scene.gravity);
     last_moment_ = point_sums(solver.bodies(), lattice_).moment;
-    const std::vector<Vec2> initial = initial_positions(scene);
+    const std::vector<Vec<2>> initial = initial_positions(scene);
     for (const ProbeSpec& spec : scene.probes)
     {
         const Expression where(spec.where, constants);
         Probe probe{spec.name};
         for (std::uint32_t id = 0; id < initial.size(); ++id)
-            if (const Vec2& X = initial[id]; where({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]}) != 0)
+            if (const Vec<2>& X = initial[id]; where({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]}) != 0)
             {
                 probe.ids.push_back(id);
                 probe.initial.push_back(X);
@@ -57,24 +57,24 @@ std::vector<Observer::Location> Observer::locations() const
     std::vector<Location> where(n);
     for (std::uint32_t b = 0; b < solver_.bodies().size(); ++b)
     {
-        const Points& q = solver_.bodies()[b].points;
+        const Points<2>& q = solver_.bodies()[b].points;
         for (std::uint32_t p = 0; p < q.count; ++p)
             where[q.id[p]] = {b, p};
     }
     return where;
 }
 
-Place Observer::place(const Location& at, const Vec2& initial, double t) const
+Place Observer::place(const Location& at, const Vec<2>& initial, double t) const
 {
-    const Points& q = solver_.bodies()[at.body].points;
-    return {initial[0], initial[1], q.x[at.point], q.y[at.point], t};
+    const Points<2>& q = solver_.bodies()[at.body].points;
+    return {initial[0], initial[1], q.x[0][at.point], q.x[1][at.point], t};
 }
 
 std::array<double, 6> Observer::stress(const Location& at) const
 {
     const Body& body = solver_.bodies()[at.body];
-    const Points& q = body.points;
-    return {q.sxx[at.point], q.sxy[at.point], 0, q.syy[at.point], 0, out_of_plane_stress(body.material, q, at.point)};
+    const Points<2>& q = body.points;
+    return {q.stress[0][at.point], q.stress[2][at.point], 0, q.stress[1][at.point], 0, out_of_plane_stress(body.material, q, at.point)};
 }
 
 std::array<double, 6> Observer::exact_stress(const Place& at) const
@@ -88,7 +88,7 @@ std::array<double, 3> Observer::exact_displacement(const Place& at) const
     return {exact_.displacement[0](at), exact_.displacement[1](at), 0};
 }
 
-double Observer::gravity_work(double t, const Vec2& moment)
+double Observer::gravity_work(double t, const Vec<2>& moment)
 {
     const double f = 0.5 * (gravity_->factor(last_time_) + gravity_->factor(t));
     double fall = 0;
@@ -189,7 +189,7 @@ void Observer::sample_probes(double t)
         {
             const Location at = where[probe.ids[n]];
             const Place here = place(at, probe.initial[n], t);
-            const Vec2 v = solver_.velocity(at.body, at.point);
+            const Vec<2> v = solver_.velocity(at.body, at.point);
             const auto add = [&](std::size_t k, const auto& values)
             {
                 for (std::size_t c = 0; c < values.size(); ++c)

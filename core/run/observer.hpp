@@ -52,7 +52,7 @@ private:
     {
         std::string name;
         std::vector<std::uint32_t> ids{};
-        std::vector<Vec2> initial{};
+        std::vector<Vec<2>> initial{};
         std::vector<Series> series{};
     };
     struct Exact
@@ -73,12 +73,12 @@ private:
     /// Columns for those fields of the points that say that they are shown.
     void list_fields();
     std::vector<Location> locations() const;
-    Place place(const Location& at, const Vec2& initial, double t) const;
+    Place place(const Location& at, const Vec<2>& initial, double t) const;
     std::array<double, 6> stress(const Location& at) const;
     std::array<double, 6> exact_stress(const Place& at) const;
     std::array<double, 3> exact_displacement(const Place& at) const;
     /// The work of gravity on the points up to time t [J/m].
-    double gravity_work(double t, const Vec2& moment);
+    double gravity_work(double t, const Vec<2>& moment);
     void write_ledger(const GuardSample& sample);
     void sample_probes(double t);
     void sample_restraints();
@@ -98,12 +98,12 @@ private:
     std::vector<Probe> probes_;
     std::vector<double> snapshot_times_;
     std::vector<Column> columns_;
-    Lattice lattice_;
+    Lattice<2> lattice_;
     Ledger ledger_;
     PlasticWork plastic_;
     GuardSample last_;
     double gravity_work_ = 0, gravity_work_error_ = 0, last_time_ = 0, guard_seconds_ = 0;
-    Vec2 last_moment_;
+    Vec<2> last_moment_;
 };
 
 template <class Archive>

@@ -58,24 +58,24 @@ public:
 
     std::size_t count() const { return places_.size(); }
 
-    Unknown unknown(std::size_t n, const State& about, const StateScales& scales, const Lattice& lattice) const
+    Unknown unknown(std::size_t n, const State& about, const StateScales& scales, const Lattice<2>& lattice) const
     {
         const Place& p = places_[n];
         return {.kind = p.quantity.kind,
                 .component = p.quantity.component,
                 .is_nodal = p.node.has_value(),
                 .place = p.node ? lattice.node_position(*p.node) : p.at,
-                .node = p.node.value_or(NodeIndex{0, 0}),
+                .node = p.node.value_or(Index<2>{0, 0}),
                 .scale = scales.of(about.parts[p.part].unit)};
     }
 
     /// Number of each unknown in state.numbers; none for nodes that it does not have.
-    std::vector<std::optional<std::size_t>> find(const State& state, const NodeIndex& shift = {0, 0}) const
+    std::vector<std::optional<std::size_t>> find(const State& state, const Index<2>& shift = {0, 0}) const
     {
         std::vector<std::vector<std::size_t>> orders;
         for (const BodyParts& body : bodies_)
             orders.push_back(by_id(state, body.id));
-        std::map<NodeIndex, std::size_t> nodes;
+        std::map<Index<2>, std::size_t> nodes;
         if (has_nodes_)
             for (std::size_t k = 0; k < state.parts[node_i_].count; ++k)
                 nodes.emplace(node(state, k), k);
@@ -83,7 +83,7 @@ public:
         for (const Place& p : places_)
             if (!p.node)
                 found.emplace_back(state.parts[p.part].begin + orders[p.body][p.number]);
-            else if (const auto n = nodes.find({p.node->i + shift.i, p.node->j + shift.j}); n != nodes.end())
+            else if (const auto n = nodes.find(*p.node + shift); n != nodes.end())
                 found.emplace_back(state.parts[p.part].begin + n->second);
             else
                 found.emplace_back();
@@ -91,9 +91,9 @@ public:
     }
 
     /// Mean motion of all points from one state to another [cells].
-    NodeIndex motion(const State& from, const State& to, double cell_size) const
+    Index<2> motion(const State& from, const State& to, double cell_size) const
     {
-        Vec2 sum{0, 0};
+        Vec<2> sum{0, 0};
         double points = 0;
         for (const BodyParts& body : bodies_)
             for (const auto& [state, sign] : {std::pair(&from, -1.0), std::pair(&to, 1.0)})
@@ -114,12 +114,12 @@ private:
     struct Place
     {
         std::size_t part, body, number;  ///< number: among the points of a body by id
-        std::optional<NodeIndex> node;
+        std::optional<Index<2>> node;
         Quantity quantity;
-        Vec2 at;
+        Vec<2> at;
     };
 
-    NodeIndex node(const State& s, std::size_t k) const { return {static_cast<int>(s.of(node_i_)[k]), static_cast<int>(s.of(node_j_)[k])}; }
+    Index<2> node(const State& s, std::size_t k) const { return {static_cast<int>(s.of(node_i_)[k]), static_cast<int>(s.of(node_j_)[k])}; }
     static std::vector<std::size_t> by_id(const State& state, std::size_t id)
     {
         const auto ids = state.of(id);
@@ -156,7 +156,7 @@ struct Slope
 class StepsAbout
 {
 public:
-    StepsAbout(Solver& solver, const State& about, const Lattice& lattice, const StepSettings& settings)
+    StepsAbout(Solver& solver, const State& about, const Lattice<2>& lattice, const StepSettings& settings)
         : solver_(solver),
           settings_(settings),
           base_(with_all_marked(about, solver.bodies())),
@@ -236,7 +236,7 @@ private:
     Places places_;
     std::vector<std::optional<std::size_t>> at_;  ///< numbers of the unknowns in the base
     std::vector<Unknown> unknowns_;
-    NodeIndex shift_{0, 0};   ///< of the body in the steps [cells]
+    Index<2> shift_{0, 0};    ///< of the body in the steps [cells]
     Eigen::VectorXd middle_;  ///< after the steps from the base
 };
 
@@ -299,7 +299,7 @@ std::size_t unknowns_of(Solver& solver, const State& state)
     return Places(solver, state).count();
 }
 
-OneStepMap one_step_map(Solver& solver, const State& about, const Lattice& lattice, const StepSettings& settings)
+OneStepMap one_step_map(Solver& solver, const State& about, const Lattice<2>& lattice, const StepSettings& settings)
 {
     StepsAbout steps(solver, about, lattice, settings);
     OneStepMap map;

@@ -31,8 +31,8 @@ struct Unknown
     Kind kind;
     int component;  ///< 0: x, 1: y of a position or velocity
     bool is_nodal;
-    Vec2 place;      ///< of the point or node [m]
-    NodeIndex node;  ///< if it is one
+    Vec<2> place;   ///< of the point or node [m]
+    Index<2> node;  ///< if it is one
     double scale;
 };
 
@@ -58,7 +58,7 @@ struct OneStepMap
 /// Nodes are taken at their place in the body: after steps that moved it by whole cells those as many columns and lines on.
 /// @param about state between two steps; the solver is left in some other state @param lattice of the solver
 /// @throws Diverged when a step fails
-OneStepMap one_step_map(Solver& solver, const State& about, const Lattice& lattice, const StepSettings& settings);
+OneStepMap one_step_map(Solver& solver, const State& about, const Lattice<2>& lattice, const StepSettings& settings);
 
 /// Number of unknowns of a state.
 std::size_t unknowns_of(Solver& solver, const State& state);

@@ -39,7 +39,7 @@ protected:
     }
 
     /// The forces of the outside, once those of the stresses are at the nodes.
-    void apply_loads(const char* phase, const Lattice& lattice, Nodes& nodes, const Step& step)
+    void apply_loads(const char* phase, const Lattice<2>& lattice, Nodes<2>& nodes, const Step& step)
     {
         internal_ = force_norm(nodes);
         if (body_force_)
@@ -63,7 +63,7 @@ protected:
     }
     /// What a step depends on beside the unknowns of nodes. Returns the lattice with the numbers that it has in the state.
     template <class Archive>
-    Lattice state_of_points(Archive& a, Lattice lattice)
+    Lattice<2> state_of_points(Archive& a, Lattice<2> lattice)
     {
         cloud_.state(a);
         node_ops_.state(a);

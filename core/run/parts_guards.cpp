@@ -132,12 +132,12 @@ private:
 
 using Key = std::pair<int, int>;
 
-std::vector<Key> places(const std::vector<Bin>& bins)
+std::vector<Key> places(const std::vector<Bin<2>>& bins)
 {
     std::vector<Key> keys;
     keys.reserve(bins.size());
-    for (const Bin& bin : bins)
-        keys.emplace_back(bin.j, bin.i);
+    for (const Bin<2>& bin : bins)
+        keys.emplace_back(bin.at[1], bin.at[0]);
     std::sort(keys.begin(), keys.end());
     return keys;
 }
@@ -153,7 +153,7 @@ void for_each_near(const std::vector<Key>& keys, const Key& at, int reach, F&& f
 }
 }  // namespace
 
-std::size_t connected_parts(const std::vector<Bin>& bins, int reach)
+std::size_t connected_parts(const std::vector<Bin<2>>& bins, int reach)
 {
     const std::vector<Key> keys = places(bins);
     std::vector<bool> seen(keys.size());
@@ -182,12 +182,12 @@ std::size_t connected_parts(const std::vector<Bin>& bins, int reach)
     return parts;
 }
 
-bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach)
+bool in_contact(const std::vector<Bin<2>>& a, const std::vector<Bin<2>>& b, int reach)
 {
     const std::vector<Key> keys = places(b);
     bool touch = false;
-    for (const Bin& bin : a)
-        for_each_near(keys, {bin.j, bin.i}, reach, [&](std::size_t) { touch = true; });
+    for (const Bin<2>& bin : a)
+        for_each_near(keys, {bin.at[1], bin.at[0]}, reach, [&](std::size_t) { touch = true; });
     return touch;
 }
 

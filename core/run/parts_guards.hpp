@@ -6,9 +6,9 @@
 namespace testbed
 {
 /// Parts of a body between which no force passes: they share no node. @param reach bins (columns or lines) at which two still share one
-std::size_t connected_parts(const std::vector<Bin>& bins, int reach);
+std::size_t connected_parts(const std::vector<Bin<2>>& bins, int reach);
 /// Whether two bodies share a node.
-bool in_contact(const std::vector<Bin>& a, const std::vector<Bin>& b, int reach);
+bool in_contact(const std::vector<Bin<2>>& a, const std::vector<Bin<2>>& b, int reach);
 /// separated, contact_lost.
 std::vector<std::unique_ptr<Guard>> parts_guards(const Scene& scene);
 }  // namespace testbed

@@ -14,7 +14,7 @@ constexpr int most_steps = 1000000;  // a line of the answer each
 
 struct PointState
 {
-    SymTensor<> stress;
+    SymTensor<2> stress;
     double stress_zz = 0, plastic_shear_strain = 0;
 };
 
@@ -30,8 +30,8 @@ public:
             state_.stress_zz = initial[2];
     }
     PointState now() const { return of(state_); }
-    void advance(const Gradient<>& d) { law_.update(state_, d); }
-    double stress_xx_after(const Gradient<>& d) const
+    void advance(const Gradient<2>& d) { law_.update(state_, d); }
+    double stress_xx_after(const Gradient<2>& d) const
     {
         auto trial = state_;
         law_.update(trial, d);
@@ -54,7 +54,7 @@ private:
 /// The lateral strain increment that leads to the lateral stress `target`: the stress grows with it.
 /// @throws SceneError, beginning with `where`, if none does
 template <class Point>
-double find_lateral_strain(const Point& point, Gradient<> d, double target, const std::string& where)
+double find_lateral_strain(const Point& point, Gradient<2> d, double target, const std::string& where)
 {
     const auto excess = [&](double xx)
     {
@@ -78,7 +78,7 @@ std::string drive(const Law& law, const PointPathSpec& spec, const std::string& 
 {
     std::string text = "step,strain_xx,strain_yy,shear_xy,stress_xx,stress_yy,stress_zz,stress_xy,plastic_shear_strain,work\n";
     DrivenPoint<Law> point(law, spec.initial_stress);
-    Gradient<> total;
+    Gradient<2> total;
     double work = 0;
     std::int64_t step = 0;
     const auto write = [&]
@@ -94,13 +94,13 @@ std::string drive(const Law& law, const PointPathSpec& spec, const std::string& 
         const double n = segment.steps, from = point.now().stress.xx;
         for (int k = 1; k <= segment.steps; ++k)
         {
-            Gradient<> d{segment.gradient[0] / n, segment.gradient[1] / n, segment.gradient[2] / n, segment.gradient[3] / n};
+            Gradient<2> d{segment.gradient[0] / n, segment.gradient[1] / n, segment.gradient[2] / n, segment.gradient[3] / n};
             if (segment.stress_xx)
                 d.xx = find_lateral_strain(point, d, from + (*segment.stress_xx - from) * k / n,
                                            fmt::format("{}: segment[{}], step {}", path, number, k));
-            const SymTensor<> before = point.now().stress;
+            const SymTensor<2> before = point.now().stress;
             point.advance(d);
-            const SymTensor<> after = point.now().stress;
+            const SymTensor<2> after = point.now().stress;
             work += 0.5 * ((before.xx + after.xx) * d.xx + (before.yy + after.yy) * d.yy + (before.xy + after.xy) * d.shear());
             total = total + d;
             if (!std::isfinite(after.xx + after.yy + after.xy + point.now().stress_zz + work))

@@ -10,7 +10,7 @@ namespace testbed
 {
 void Observer::list_columns()
 {
-    const auto points = [this](const Location& at) -> const Points& { return solver_.bodies()[at.body].points; };
+    const auto points = [this](const Location& at) -> const Points<2>& { return solver_.bodies()[at.body].points; };
     const auto vector = [](double* row, double x, double y)
     {
         row[0] = x;
@@ -26,7 +26,7 @@ void Observer::list_columns()
     list("velocity", "m/s", 3,
          [=, this](const Location& at, const Place&, double* row)
          {
-             const Vec2 v = solver_.velocity(at.body, at.point);
+             const Vec<2> v = solver_.velocity(at.body, at.point);
              vector(row, v[0], v[1]);
          });
     list("stress", "Pa", 6, [this](const Location& at, const Place&, double* row) { std::ranges::copy(stress(at), row); });
@@ -76,14 +76,17 @@ void Observer::list_fields()
 void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
 {
     const std::vector<Location> where = locations();
-    const std::vector<Vec2> initial = initial_positions(scene_);
+    const std::vector<Vec<2>> initial = initial_positions(scene_);
     const std::string group = fmt::format("/snapshots/{:04}", snapshot_times_.size());
     file.attribute(group, "time", t);
     file.attribute(group, "step", step);
+    std::vector<std::string> constant;
     for (const Column& column : columns_)
     {
         if (column.at_start_only && !snapshot_times_.empty())
             continue;
+        if (column.at_start_only)
+            constant.push_back(column.name);
         std::vector<double> values(where.size() * column.columns);
         for (std::size_t n = 0; n < where.size(); ++n)
             column.fill(where[n], place(where[n], initial[n], t), &values[n * column.columns]);
@@ -97,6 +100,8 @@ void Observer::snapshot(ResultFile& file, double t, std::int64_t step)
     }
     file.dataset(group + "/id", "-", id);
     file.dataset(group + "/body", "-", body);
+    if (!constant.empty())
+        file.attribute(group, "constant", fmt::format("{}", fmt::join(constant, " ")));
     file.flush();
     snapshot_times_.push_back(t);
 }

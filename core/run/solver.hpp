@@ -18,7 +18,7 @@ struct MotionSums
 {
     double kinetic_energy = 0;    ///< sum of m v(t - dt/2) . v(t + dt/2) / 2 [J/m]: what is constant beside the strain energy at t
     double kinetic_before = 0;    ///< sum over nodes of m v(t - dt/2)^2 / 2 [J/m]: never negative
-    Vec2 momentum{0, 0};          ///< kg/s
+    Vec<2> momentum{0, 0};        ///< kg/s
     double angular_momentum = 0;  ///< kg m/s, about the lattice origin
     double unbalanced = 0;        ///< norm of the nodal forces out of balance over that of the internal ones
 };
@@ -26,19 +26,22 @@ struct MotionSums
 /// Sums over nodes whose velocity is `lag` seconds behind their forces. A light node may be accelerated beyond measure for half a step;
 /// the product of the velocities before and after does not take that for motion, as the square at the time of the forces would.
 /// @param internal norm of the internal nodal forces
-inline MotionSums nodal_sums(const Lattice& lattice, const Nodes& nodes, double lag, double internal)
+inline MotionSums nodal_sums(const Lattice<2>& lattice, const Nodes<2>& nodes, double lag, double internal)
 {
     const auto s = ordered_sum<5>(nodes.active().size(),
                                   [&](std::size_t a)
                                   {
                                       const std::size_t i = nodes.active()[a];
-                                      const Vec2 x = lattice.node_position(i);
+                                      const Vec<2> x = lattice.node_position(i);
                                       const double m = nodes.mass[i], step = inverse_mass(nodes, i) * lag;
-                                      const double ux = nodes.vx[i], uy = nodes.vy[i];  // before
-                                      const double vx = ux + nodes.fx[i] * step, vy = uy + nodes.fy[i] * step;
-                                      const double square = ux * ux + uy * uy;
-                                      return std::array<double, 5>{m * (ux * vx + uy * vy - 0.5 * square), 0.5 * m * square, m * vx, m * vy,
-                                                                   m * ((x[0] - lattice.origin[0]) * vy - (x[1] - lattice.origin[1]) * vx)};
+                                      const Vec<2> before = at(nodes.v, i);
+                                      Vec<2> v;
+                                      for (std::size_t d = 0; d < 2; ++d)
+                                          v[d] = before[d] + nodes.f[d][i] * step;
+                                      const double square = total<2>([&](auto d) { return before[d] * before[d]; });
+                                      const double product = total<2>([&](auto d) { return before[d] * v[d]; });
+                                      const double spin = (x[0] - lattice.origin[0]) * v[1] - (x[1] - lattice.origin[1]) * v[0];
+                                      return std::array{m * (product - 0.5 * square), 0.5 * m * square, m * v[0], m * v[1], m * spin};
                                   });
     return {s[0], s[1], {s[2], s[3]}, s[4], internal > 0 ? force_norm(nodes) / internal : 0};
 }
@@ -48,20 +51,20 @@ struct PointMotion
 {
     double kinetic_energy = 0;  ///< J/m
     double speed = 0;           ///< largest [m/s]
-    Vec2 momentum{0, 0};        ///< kg/s
+    Vec<2> momentum{0, 0};      ///< kg/s
     double mass = 0;            ///< kg/m
 };
 
-/// @param velocity (body, point) -> Vec2
+/// @param velocity (body, point) -> Vec<2>
 template <class Velocity>
 PointMotion point_motion_of(const std::vector<Body>& bodies, Velocity&& velocity)
 {
     PointMotion motion;
     double square = 0;
-    std::vector<Vec2> v;  // a velocity may have to be interpolated: once is enough
+    std::vector<Vec<2>> v;  // a velocity may have to be interpolated: once is enough
     for (std::size_t b = 0; b < bodies.size(); ++b)
     {
-        const Points& q = bodies[b].points;
+        const Points<2>& q = bodies[b].points;
         v.resize(q.count);
         parallel_for(q.count, [&](std::size_t p) { v[p] = velocity(b, p); });
         const auto squared = [&](std::size_t p) { return v[p][0] * v[p][0] + v[p][1] * v[p][1]; };
@@ -107,7 +110,7 @@ public:
     virtual void update_points() {}
     virtual const std::vector<Body>& bodies() const = 0;
     /// Velocity of a point, at the half step before the last prepare().
-    virtual Vec2 velocity(std::size_t body, std::size_t point) const = 0;
+    virtual Vec<2> velocity(std::size_t body, std::size_t point) const = 0;
     virtual PointMotion point_motion() const
     {
         return point_motion_of(bodies(), [&](std::size_t body, std::size_t point) { return velocity(body, point); });
@@ -117,7 +120,7 @@ public:
     /// The same up to the last kick, which no step depends on: a restart keeps it. Null without work().
     virtual NodalWork* work_done() { return nullptr; }
     /// The nodes and their lattice at the last prepare(), for the diagnosis of a run that failed.
-    virtual std::pair<const Lattice*, const Nodes*> nodes() const { return {nullptr, nullptr}; }
+    virtual std::pair<const Lattice<2>*, const Nodes<2>*> nodes() const { return {nullptr, nullptr}; }
     virtual std::size_t unknowns() const = 0;  ///< nodal unknowns that carry mass
     virtual std::size_t active_cells() const = 0;
     virtual std::size_t bytes() const = 0;  ///< of all arrays

@@ -11,17 +11,16 @@ namespace
 {
 using Matrix = Eigen::MatrixXd;
 constexpr double forgotten = 1e-4;  ///< an eigenvalue of a chain of zeros is the root of a difference of 1e-10
-using Eigen::Index;
 
 /// QR with pivots, and the rank: how many of them exceed the tolerance.
 struct Ranked
 {
     Eigen::ColPivHouseholderQR<Matrix> qr;
-    Index rank = 0;
+    Eigen::Index rank = 0;
 
     Ranked(const Matrix& a, double tolerance) : qr(a)
     {
-        const Index most = std::min(a.rows(), a.cols());
+        const Eigen::Index most = std::min(a.rows(), a.cols());
         while (rank < most && std::abs(qr.matrixQR()(rank, rank)) > tolerance)
             ++rank;
     }
@@ -29,7 +28,7 @@ struct Ranked
     Matrix range() const { return qr.householderQ() * Matrix::Identity(qr.rows(), rank); }
 };
 
-Index rank_of(const Matrix& a, double tolerance)
+Eigen::Index rank_of(const Matrix& a, double tolerance)
 {
     return a.size() == 0 ? 0 : Ranked(a, tolerance).rank;
 }
@@ -53,7 +52,7 @@ struct Reduced
 };
 Reduced reduce(const Matrix& map, double tolerance)
 {
-    const Index n = map.rows();
+    const Eigen::Index n = map.rows();
     Reduced r{map - Matrix::Identity(n, n), Matrix::Identity(n, n)};
     for (bool first = true; r.less_one.rows() > 0; first = false)
     {
@@ -70,16 +69,16 @@ Reduced reduce(const Matrix& map, double tolerance)
 }
 
 /// Rows and columns of a matrix by lists.
-Matrix part(const Matrix& a, const std::vector<Index>& rows, const std::vector<Index>& columns)
+Matrix part(const Matrix& a, const std::vector<Eigen::Index>& rows, const std::vector<Eigen::Index>& columns)
 {
     return a(rows, columns);
 }
 
 /// The motions of points as one body, orthonormal columns over their positions.
-Matrix rigid_motions(const OneStepMap& map, const std::vector<Index>& positions)
+Matrix rigid_motions(const OneStepMap& map, const std::vector<Eigen::Index>& positions)
 {
-    Vec2 centre{0, 0};
-    for (const Index n : positions)
+    Vec<2> centre{0, 0};
+    for (const Eigen::Index n : positions)
         for (std::size_t k = 0; k < 2; ++k)
             centre[k] += map.unknowns[static_cast<std::size_t>(n)].place[k] / static_cast<double>(positions.size());
     Matrix rigid(positions.size(), 3);
@@ -87,21 +86,21 @@ Matrix rigid_motions(const OneStepMap& map, const std::vector<Index>& positions)
     {
         const Unknown& u = map.unknowns[static_cast<std::size_t>(positions[n])];
         const bool is_x = u.component == 0;
-        rigid.row(static_cast<Index>(n)) << is_x, !is_x, is_x ? centre[1] - u.place[1] : u.place[0] - centre[0];
+        rigid.row(static_cast<Eigen::Index>(n)) << is_x, !is_x, is_x ? centre[1] - u.place[1] : u.place[0] - centre[0];
     }
     return Eigen::HouseholderQR<Matrix>(rigid).householderQ() * Matrix::Identity(rigid.rows(), 3);
 }
 
 /// The two checkerboards of the nodal velocities, columns of norm 1; none where the velocity does not live on nodes.
-Matrix checkerboards(const OneStepMap& map, const std::vector<Index>& velocities)
+Matrix checkerboards(const OneStepMap& map, const std::vector<Eigen::Index>& velocities)
 {
     if (velocities.empty() || !map.unknowns[static_cast<std::size_t>(velocities[0])].is_nodal)
         return Matrix(velocities.size(), 0);
-    Matrix patterns = Matrix::Zero(static_cast<Index>(velocities.size()), 2);
+    Matrix patterns = Matrix::Zero(static_cast<Eigen::Index>(velocities.size()), 2);
     for (std::size_t n = 0; n < velocities.size(); ++n)
     {
         const Unknown& u = map.unknowns[static_cast<std::size_t>(velocities[n])];
-        patterns(static_cast<Index>(n), u.component) = (u.node.i + u.node.j) % 2 == 0 ? 1 : -1;
+        patterns(static_cast<Eigen::Index>(n), u.component) = (u.node[0] + u.node[1]) % 2 == 0 ? 1 : -1;
     }
     patterns.colwise().normalize();
     return patterns;
@@ -120,7 +119,7 @@ Spectrum spectrum(const Matrix& map, double tolerance)
     const Eigen::EigenSolver<Matrix> solver(reduced.less_one);
     const auto values = solver.eigenvalues();
     const auto vectors = solver.eigenvectors();
-    for (Index k = 0; k < values.size(); ++k)
+    for (Eigen::Index k = 0; k < values.size(); ++k)
         if (std::abs(1.0 + values[k]) < forgotten)
             ++out.forgotten;
         else if (values[k].imag() >= 0)
@@ -147,7 +146,7 @@ NullModes null_modes(const OneStepMap& map, double tolerance)
 {
     using Kind = Unknown::Kind;
     const auto v = map.all(Kind::velocity), x = map.all(Kind::position), s = map.all(Kind::stress);
-    const auto columns = static_cast<Index>(v.size());
+    const auto columns = static_cast<Eigen::Index>(v.size());
     const Matrix stress = part(map.matrix, s, v), motion = part(map.matrix, x, v), kept = part(map.matrix, v, v);
     NullModes out;
 
@@ -163,30 +162,30 @@ NullModes null_modes(const OneStepMap& map, double tolerance)
     const Matrix free = null_space(felt, tolerance);
     const Matrix moves = motion * free, rigid = rigid_motions(map, x);
     const Matrix deforms = moves - rigid * (rigid.transpose() * moves);
-    const Index moving = rank_of(moves, tolerance), deforming = rank_of(deforms, tolerance);
+    const Eigen::Index moving = rank_of(moves, tolerance), deforming = rank_of(deforms, tolerance);
     out.rigid = static_cast<std::size_t>(moving - deforming);
     out.deforming = static_cast<std::size_t>(deforming);
 
     const Matrix patterns = checkerboards(map, v);
     std::vector<Eigen::VectorXd> hourglass;
-    for (Index k = 0; k < patterns.cols(); ++k)
+    for (Eigen::Index k = 0; k < patterns.cols(); ++k)
         if ((free.transpose() * patterns.col(k)).norm() > 1 - tolerance)
             hourglass.push_back(patterns.col(k));
     out.hourglass = hourglass.size();
 
     // the others: orthogonal to these and to what moves the points as one body or not at all
     const Matrix undeformed = null_space(deforms, tolerance);
-    Matrix known(free.cols(), undeformed.cols() + static_cast<Index>(hourglass.size()));
+    Matrix known(free.cols(), undeformed.cols() + static_cast<Eigen::Index>(hourglass.size()));
     known.leftCols(undeformed.cols()) = undeformed;
     for (std::size_t h = 0; h < hourglass.size(); ++h)
-        known.col(undeformed.cols() + static_cast<Index>(h)) = free.transpose() * hourglass[h];
+        known.col(undeformed.cols() + static_cast<Eigen::Index>(h)) = free.transpose() * hourglass[h];
     const Matrix others = free * null_space(known.transpose(), tolerance);
-    out.shapes = Matrix::Zero(map.matrix.rows(), static_cast<Index>(hourglass.size()) + others.cols());
+    out.shapes = Matrix::Zero(map.matrix.rows(), static_cast<Eigen::Index>(hourglass.size()) + others.cols());
     for (std::size_t k = 0; k < v.size(); ++k)
     {
         for (std::size_t h = 0; h < hourglass.size(); ++h)
-            out.shapes(v[k], static_cast<Index>(h)) = hourglass[h][static_cast<Index>(k)];
-        out.shapes.row(v[k]).tail(others.cols()) = others.row(static_cast<Index>(k));
+            out.shapes(v[k], static_cast<Eigen::Index>(h)) = hourglass[h][static_cast<Eigen::Index>(k)];
+        out.shapes.row(v[k]).tail(others.cols()) = others.row(static_cast<Eigen::Index>(k));
     }
     return out;
 }

@@ -26,7 +26,7 @@ double isolated_cell_limit(const std::vector<Body>& bodies, double cell_size)
     double fastest = 0;  // square of kappa / rho
     for (const Body& body : bodies)
     {
-        const Points& q = body.points;
+        const Points<2>& q = body.points;
         const double volume = parallel_max(q.count, [&](std::size_t p) { return q.current_volume(p) * stiffness_ratio(q, p); });
         fastest = std::max(fastest, gradient_stiffness(moduli(body.material)) * volume / q.mass);
     }

@@ -129,19 +129,19 @@ void check_inclusion(const Scene& scene, const BodySpec& body, const std::string
         return problems.add(key + ".inside", fmt::format("no body '{}' that could hold an inclusion", body.inside) +
                                                  (names.empty() ? "" : suggestion(body.inside, names)));
     const BodySpec& host = scene.body(body.inside);
-    const std::vector<Vec2> own = fill(scene, body);
+    const std::vector<Vec<2>> own = fill(scene, body);
     for (const BodySpec& other : scene.bodies)
     {
         if (&other == &body)
             break;
         if (other.inside != body.inside)
             continue;
-        for (const Vec2& p : own)
+        for (const Vec<2>& p : own)
             if (contains(other, p))
                 return problems.add(key,
                                     fmt::format("inclusion '{}' overlaps inclusion '{}' at ({}, {}) m", body.name, other.name, p[0], p[1]));
     }
-    for (const Vec2& corner : outline(body))
+    for (const Vec<2>& corner : outline(body))
         if (!contains(host, corner, 1e-6 * scene.grid.cell_size))
             return problems.add(
                 key, fmt::format("inclusion '{}' reaches ({}, {}) m, outside body '{}'", body.name, corner[0], corner[1], host.name));
@@ -188,13 +188,13 @@ void check_overlap(const Scene& scene, Problems& problems)
             overlap &= (*a.min)[d] < (*b.max)[d] - slack && (*b.min)[d] < (*a.max)[d] - slack;
         return overlap;
     };
-    std::map<const BodySpec*, std::vector<Vec2>> filled;  // of those that are asked for, once
+    std::map<const BodySpec*, std::vector<Vec<2>>> filled;  // of those that are asked for, once
     const auto has_points_in = [&](const BodySpec& a, const BodySpec& b)
     {
         auto& points = filled[&a];
         if (points.empty())
             points = fill(scene, a);
-        return std::any_of(points.begin(), points.end(), [&](const Vec2& p) { return contains(b, p, -slack); });
+        return std::any_of(points.begin(), points.end(), [&](const Vec<2>& p) { return contains(b, p, -slack); });
     };
     const auto apart = [&](const BodySpec& a, const BodySpec& b)
     {

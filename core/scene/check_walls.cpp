@@ -12,7 +12,7 @@ double slack(const GridSpec& grid)
     return 1e-6 * grid.cell_size;
 }
 
-bool reaches_out(const GridSpec& grid, const Vec2& min, const Vec2& max)
+bool reaches_out(const GridSpec& grid, const Vec<2>& min, const Vec<2>& max)
 {
     bool out = false;
     for (std::size_t k = 0; k < 2; ++k)
@@ -76,7 +76,7 @@ void check_travel(const Scene& scene, const WallSpec& wall, const std::string& k
     {
         const auto path = wall_path(wall, scene.expression_constants(), scene.time.end);
         for (std::size_t n = 0; n < path.size(); ++n)
-            if (const Vec2& u = path[n];
+            if (const Vec<2>& u = path[n];
                 reaches_out(scene.grid, {wall.min[0] + u[0], wall.min[1] + u[1]}, {wall.max[0] + u[0], wall.max[1] + u[1]}))
                 return problems.add(
                     key,

@@ -123,7 +123,7 @@ double Expression::finite(const Place& place) const
 
 bool holds_near(const Expression& condition, double x, double y, double reach)
 {
-    const Vec2 offsets[] = {{0, 0}, {-reach, -reach}, {reach, -reach}, {-reach, reach}, {reach, reach}};
+    const Vec<2> offsets[] = {{0, 0}, {-reach, -reach}, {reach, -reach}, {-reach, reach}, {reach, reach}};
     for (const auto& [dx, dy] : offsets)
     {
         if (condition.finite({.X = x + dx, .Y = y + dy, .x = x + dx, .y = y + dy}) != 0)

@@ -52,7 +52,7 @@ struct VectorExpression
 
     VectorExpression(const Expr2& text, const Constants& constants) : x(text[0], constants), y(text[1], constants) {}
     /// @throws ExpressionError if it is not finite
-    Vec2 operator()(const Place& place) const { return {x.finite(place), y.finite(place)}; }
+    Vec<2> operator()(const Place& place) const { return {x.finite(place), y.finite(place)}; }
 };
 
 /// Whether a condition holds at a place or within `reach` of it [m]: a node at 0.30000000000000004 is on the line x <= 0.3.

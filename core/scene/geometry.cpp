@@ -10,7 +10,7 @@ namespace testbed
 {
 namespace
 {
-bool inside_polygon(const std::vector<Vec2>& v, const Vec2& p)
+bool inside_polygon(const std::vector<Vec<2>>& v, const Vec<2>& p)
 {
     bool inside = false;
     for (std::size_t k = 0, last = v.size() - 1; k < v.size(); last = k++)
@@ -20,10 +20,10 @@ bool inside_polygon(const std::vector<Vec2>& v, const Vec2& p)
 }
 
 /// Centres of the squares of a body's pattern that lie in a box, whether in its shape or not.
-std::vector<Vec2> pattern(const BodySpec& body, const GridSpec& grid, const std::array<Vec2, 2>& box)
+std::vector<Vec<2>> pattern(const BodySpec& body, const GridSpec& grid, const std::array<Vec<2>, 2>& box)
 {
     const double h = spacing(body, grid);
-    Vec2 corner = grid.origin, size = grid.size;
+    Vec<2> corner = grid.origin, size = grid.size;
     if (body.shape == BodySpec::Shape::box)
     {
         corner = *body.min;
@@ -35,7 +35,7 @@ std::vector<Vec2> pattern(const BodySpec& body, const GridSpec& grid, const std:
         from[k] = std::max(0LL, static_cast<long long>(std::floor((box[0][k] - corner[k]) / h)) - 1);
         to[k] = std::min(std::llround(size[k] / h), static_cast<long long>(std::ceil((box[1][k] - corner[k]) / h)) + 1);
     }
-    std::vector<Vec2> points;
+    std::vector<Vec<2>> points;
     for (long long j = from[1]; j < to[1]; ++j)
         for (long long i = from[0]; i < to[0]; ++i)
             points.push_back({corner[0] + (static_cast<double>(i) + 0.5) * h, corner[1] + (static_cast<double>(j) + 0.5) * h});
@@ -43,7 +43,7 @@ std::vector<Vec2> pattern(const BodySpec& body, const GridSpec& grid, const std:
 }
 }  // namespace
 
-bool contains(const BodySpec& body, const Vec2& p, double slack)
+bool contains(const BodySpec& body, const Vec<2>& p, double slack)
 {
     switch (body.shape)
     {
@@ -56,36 +56,36 @@ bool contains(const BodySpec& body, const Vec2& p, double slack)
     throw std::logic_error("not a shape");
 }
 
-std::optional<std::array<std::size_t, 2>> crossing_edges(const std::vector<Vec2>& v)
+std::optional<std::array<std::size_t, 2>> crossing_edges(const std::vector<Vec<2>>& v)
 {
-    const auto turn = [](const Vec2& a, const Vec2& b, const Vec2& c)
+    const auto turn = [](const Vec<2>& a, const Vec<2>& b, const Vec<2>& c)
     { return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]); };
     const std::size_t n = v.size();
     for (std::size_t i = 0; i < n; ++i)
         for (std::size_t j = i + 1; j < n; ++j)
         {
-            const Vec2 &a = v[i], &b = v[(i + 1) % n], &c = v[j], &d = v[(j + 1) % n];
+            const Vec<2>&a = v[i], &b = v[(i + 1) % n], &c = v[j], &d = v[(j + 1) % n];
             if (turn(a, b, c) * turn(a, b, d) < 0 && turn(c, d, a) * turn(c, d, b) < 0)
                 return std::array{i, j};
         }
     return std::nullopt;
 }
 
-std::array<Vec2, 2> extent(const BodySpec& body)
+std::array<Vec<2>, 2> extent(const BodySpec& body)
 {
     switch (body.shape)
     {
     case BodySpec::Shape::box: return {*body.min, *body.max};
     case BodySpec::Shape::disk:
     {
-        const Vec2& center = *body.center;
+        const Vec<2>& center = *body.center;
         const double r = *body.radius;
-        return {Vec2{center[0] - r, center[1] - r}, Vec2{center[0] + r, center[1] + r}};
+        return {Vec<2>{center[0] - r, center[1] - r}, Vec<2>{center[0] + r, center[1] + r}};
     }
     case BodySpec::Shape::polygon:
     {
-        std::array<Vec2, 2> box{body.vertices[0], body.vertices[0]};
-        for (const Vec2& v : body.vertices)
+        std::array<Vec<2>, 2> box{body.vertices[0], body.vertices[0]};
+        for (const Vec<2>& v : body.vertices)
             for (std::size_t k = 0; k < 2; ++k)
             {
                 box[0][k] = std::min(box[0][k], v[k]);
@@ -97,7 +97,7 @@ std::array<Vec2, 2> extent(const BodySpec& body)
     throw std::logic_error("not a shape");
 }
 
-std::vector<Vec2> outline(const BodySpec& body)
+std::vector<Vec<2>> outline(const BodySpec& body)
 {
     switch (body.shape)
     {
@@ -105,7 +105,7 @@ std::vector<Vec2> outline(const BodySpec& body)
     case BodySpec::Shape::polygon: return body.vertices;
     case BodySpec::Shape::disk:
     {
-        std::vector<Vec2> circle;
+        std::vector<Vec<2>> circle;
         for (int k = 0; k < 64; ++k)
         {
             const double angle = 2 * std::numbers::pi * k / 64;
@@ -117,7 +117,7 @@ std::vector<Vec2> outline(const BodySpec& body)
     throw std::logic_error("not a shape");
 }
 
-std::vector<Vec2> fill(const Scene& scene, const BodySpec& body)
+std::vector<Vec<2>> fill(const Scene& scene, const BodySpec& body)
 {
     const bool is_inclusion = !body.inside.empty();
     const BodySpec& host = is_inclusion ? scene.body(body.inside) : body;
@@ -125,9 +125,9 @@ std::vector<Vec2> fill(const Scene& scene, const BodySpec& body)
     for (const BodySpec& other : scene.bodies)
         if (other.inside == host.name && !is_inclusion)
             inclusions.push_back(&other);
-    std::vector<Vec2> points = pattern(host, scene.grid, extent(body));
+    std::vector<Vec<2>> points = pattern(host, scene.grid, extent(body));
     std::erase_if(points,
-                  [&](const Vec2& p)
+                  [&](const Vec<2>& p)
                   {
                       const auto in = [&](const BodySpec* inclusion) { return contains(*inclusion, p); };
                       return !contains(host, p) || !contains(body, p) || std::any_of(inclusions.begin(), inclusions.end(), in);
@@ -135,12 +135,12 @@ std::vector<Vec2> fill(const Scene& scene, const BodySpec& body)
     return points;
 }
 
-std::vector<Vec2> initial_positions(const Scene& scene)
+std::vector<Vec<2>> initial_positions(const Scene& scene)
 {
-    std::vector<Vec2> all;
+    std::vector<Vec<2>> all;
     for (const BodySpec& body : scene.bodies)
     {
-        const std::vector<Vec2> part = fill(scene, body);
+        const std::vector<Vec<2>> part = fill(scene, body);
         all.insert(all.end(), part.begin(), part.end());
     }
     return all;
@@ -150,7 +150,7 @@ std::vector<std::uint32_t> numbers_without_inclusions(const Scene& scene, const 
 {
     Scene alone = scene;
     std::erase_if(alone.bodies, [&](const BodySpec& other) { return other.inside == body.name; });
-    const std::vector<Vec2> part = fill(scene, body), all = fill(alone, body);
+    const std::vector<Vec<2>> part = fill(scene, body), all = fill(alone, body);
     std::vector<std::uint32_t> numbers;
     for (std::uint32_t n = 0; n < all.size() && numbers.size() < part.size(); ++n)
         if (all[n] == part[numbers.size()])

@@ -8,24 +8,24 @@
 namespace testbed
 {
 /// Whether a place lies in the body's shape, or within `slack` of a box or disk [m].
-bool contains(const BodySpec& body, const Vec2& place, double slack = 0);
+bool contains(const BodySpec& body, const Vec<2>& place, double slack = 0);
 
 /// The corners, low and high, of the box around a body's shape [m].
-std::array<Vec2, 2> extent(const BodySpec& body);
+std::array<Vec<2>, 2> extent(const BodySpec& body);
 
 /// Two edges of a closed polygon that cross, by the numbers of their first corners, if there are any.
-std::optional<std::array<std::size_t, 2>> crossing_edges(const std::vector<Vec2>& vertices);
+std::optional<std::array<std::size_t, 2>> crossing_edges(const std::vector<Vec<2>>& vertices);
 
 /// Places on the outline of a body's shape: its corners, or points around a disk.
-std::vector<Vec2> outline(const BodySpec& body);
+std::vector<Vec<2>> outline(const BodySpec& body);
 
 /// Initial positions of a body's points, in order [m]: squares of side L / points_per_cell whose centre lies in the body.
 /// A box starts its pattern at its own corner, other shapes at the lattice; an inclusion has the pattern of the body it lies in,
 /// which goes without those points.
-std::vector<Vec2> fill(const Scene& scene, const BodySpec& body);
+std::vector<Vec<2>> fill(const Scene& scene, const BodySpec& body);
 
 /// Initial positions of the points of all bodies, body after body: by id [m]. Points need not carry them.
-std::vector<Vec2> initial_positions(const Scene& scene);
+std::vector<Vec<2>> initial_positions(const Scene& scene);
 
 /// For each point of a body its number among those that the body would have without inclusions.
 std::vector<std::uint32_t> numbers_without_inclusions(const Scene& scene, const BodySpec& body);

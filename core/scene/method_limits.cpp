@@ -17,7 +17,7 @@ double largest_youngs_modulus(const Scene& scene, const MaterialSpec& material)
         {
             if (is_number(material.youngs_modulus))
                 return modulus({});
-            for (const Vec2& X : fill(scene, body))
+            for (const Vec<2>& X : fill(scene, body))
                 largest = std::max(largest, modulus({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]}));
         }
     return largest > 0 ? largest : modulus({});

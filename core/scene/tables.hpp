@@ -51,7 +51,7 @@ constexpr bool is_low(Face face)
 
 struct GridSpec
 {
-    Vec2 origin{0, 0}, size{0, 0};
+    Vec<2> origin{0, 0}, size{0, 0};
     double cell_size = 0;
 
     template <class V>
@@ -97,7 +97,7 @@ struct GravitySpec
     };
     friend constexpr auto names(Profile) { return choice_names<Profile>({{Profile::smooth, "smooth"}, {Profile::linear, "linear"}}); }
 
-    Vec2 acceleration{0, 0};
+    Vec<2> acceleration{0, 0};
     double ramp = 0;
     Profile profile = Profile::smooth;
 
@@ -137,9 +137,9 @@ struct BodySpec
     std::string name, material, inside;
     Shape shape = Shape::box;
     int points_per_cell = 4;
-    std::optional<Vec2> min, max, center;
+    std::optional<Vec<2>> min, max, center;
     std::optional<double> radius;
-    std::vector<Vec2> vertices;
+    std::vector<Vec<2>> vertices;
     std::optional<Expr2> velocity;
     std::optional<std::array<std::string, 4>> initial_stress;
 
@@ -188,9 +188,9 @@ struct WallSpec
     std::string name;
     Fix fix = Fix::xy;
     Motion motion = Motion::hand_off;
-    Vec2 min{0, 0}, max{0, 0};
+    Vec<2> min{0, 0}, max{0, 0};
     std::optional<Expr2> velocity;
-    std::optional<Vec2> door;
+    std::optional<Vec<2>> door;
     double door_opens = 0;
 
     template <class V>

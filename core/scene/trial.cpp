@@ -14,14 +14,14 @@ public:
     explicit Trial(const Scene& scene) : scene_(scene), constants_(scene.expression_constants()) {}
 
     /// @param key of the scene, for messages
-    void at_points(const std::string& key, const std::string& text, const std::vector<Vec2>& points, bool of_time) const
+    void at_points(const std::string& key, const std::string& text, const std::vector<Vec<2>>& points, bool of_time) const
     {
         named(key,
               [&]
               {
                   const Expression expression(text, constants_);
                   const bool end_too = of_time && depends_on(text, constants_, "t") && !depends_on(text, constants_, "x, y");
-                  for (const Vec2& X : points)
+                  for (const Vec<2>& X : points)
                   {
                       expression.finite({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]});
                       if (end_too)
@@ -30,19 +30,19 @@ public:
               });
     }
     template <class Texts>
-    void all_at_points(const std::string& key, const Texts& texts, const std::vector<Vec2>& points, bool of_time) const
+    void all_at_points(const std::string& key, const Texts& texts, const std::vector<Vec<2>>& points, bool of_time) const
     {
         for (const std::string& text : texts)
             at_points(key, text, points, of_time);
     }
-    void holds_somewhere(const std::string& key, const std::string& where, const std::vector<Vec2>& points) const
+    void holds_somewhere(const std::string& key, const std::string& where, const std::vector<Vec<2>>& points) const
     {
         named(key,
               [&]
               {
                   const Expression expression(where, constants_);
                   bool holds = false;
-                  for (const Vec2& X : points)
+                  for (const Vec<2>& X : points)
                       holds |= expression.finite({.X = X[0], .Y = X[1], .x = X[0], .y = X[1]}) != 0;
                   if (!holds)
                       throw ExpressionError(fmt::format("where = \"{}\" holds at no point", where));
@@ -68,12 +68,12 @@ private:
 };
 
 /// The points of the row that carries a traction.
-std::vector<Vec2> loaded_row(const TractionSpec& spec, const BodySpec& body, const GridSpec& grid, std::vector<Vec2> points)
+std::vector<Vec<2>> loaded_row(const TractionSpec& spec, const BodySpec& body, const GridSpec& grid, std::vector<Vec<2>> points)
 {
     const std::size_t normal = normal_of(spec.face);
     const bool low = is_low(spec.face);
     const double h = spacing(body, grid), face = (low ? *body.min : *body.max)[normal];
-    std::erase_if(points, [&](const Vec2& p) { return std::abs(p[normal] - face) > h; });
+    std::erase_if(points, [&](const Vec<2>& p) { return std::abs(p[normal] - face) > h; });
     return points;
 }
 }  // namespace
@@ -81,10 +81,10 @@ std::vector<Vec2> loaded_row(const TractionSpec& spec, const BodySpec& body, con
 void try_expressions(const Scene& scene)
 {
     const Trial trial(scene);
-    std::vector<Vec2> all;
+    std::vector<Vec<2>> all;
     for (const BodySpec& body : scene.bodies)
     {
-        const std::vector<Vec2> points = fill(scene, body);
+        const std::vector<Vec<2>> points = fill(scene, body);
         all.insert(all.end(), points.begin(), points.end());
         const std::string key = fmt::format("body '{}': ", body.name);
         if (body.velocity)

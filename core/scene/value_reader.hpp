@@ -88,7 +88,7 @@ public:
     {
         read(path, node, value.emplace());
     }
-    void read(const std::string& path, const toml::node& node, Vec2& value)
+    void read(const std::string& path, const toml::node& node, Vec<2>& value)
     {
         if (const toml::array* array = array_of(path, node, 2))
             for (std::size_t k = 0; k < 2; ++k)

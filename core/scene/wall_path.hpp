@@ -12,5 +12,5 @@ inline std::size_t door_direction(const WallSpec& wall)
 }
 
 /// Displacement of a wall at equal intervals from 0 to `end` [m]. @throws ExpressionError
-std::vector<Vec2> wall_path(const WallSpec& spec, const Constants& constants, double end);
+std::vector<Vec<2>> wall_path(const WallSpec& spec, const Constants& constants, double end);
 }  // namespace testbed

@@ -39,7 +39,7 @@ inline std::string toml_text(const std::string& v)
 {
     return in_quotes(v);
 }
-inline std::string toml_text(const Vec2& v);
+inline std::string toml_text(const Vec<2>& v);
 template <class Range>
 std::string toml_list(const Range& values)
 {
@@ -48,7 +48,7 @@ std::string toml_list(const Range& values)
         parts.push_back(toml_text(v));
     return fmt::format("[{}]", fmt::join(parts, ", "));
 }
-inline std::string toml_text(const Vec2& v)
+inline std::string toml_text(const Vec<2>& v)
 {
     return toml_list(v);
 }

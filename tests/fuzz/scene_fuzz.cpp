@@ -26,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         }
         variant_label(scene);
         try_expressions(scene);
-        const Lattice lattice = make_lattice(scene.grid);
+        const Lattice<2> lattice = make_lattice(scene.grid);
         make_bodies(scene, lattice, {.box = true, .velocity = true});
         NodeOps(scene, lattice).begin_step({0, 1e-3, 1e-3});
     }

@@ -4,6 +4,7 @@ import numpy as np
 from synthetic import write_result
 
 UNITS = {"plastic_shear_strain": "-", "cohesion": "Pa", "friction_angle": "rad", "body": ""}
+CONSTANT = ("cohesion", "friction_angle")  # written once
 
 
 def lattice(width, height, h):
@@ -40,12 +41,14 @@ def write_soil(path, X, h, fields=None, displacement=None, time=(0.0, 1.0), hist
         for k in range(snapshots):
             share, group = (k + 1) / snapshots, file.create_group(f"snapshots/{k:04d}")
             group.attrs.update(time=share * time[-1], step=k)
+            if k == 0 and set(CONSTANT) & set(fields):
+                group.attrs["constant"] = " ".join(CONSTANT)
             volume = np.full(len(X), h * h)
             for name, data in {"initial_position": X, "displacement": share * u, "position": X + share * u, "volume": volume,
                                "initial_volume": volume, "body": np.zeros(len(X))}.items():
                 group[name] = fields.get(name, data)
             for name in set(fields) - set(group):
-                constant = name in ("cohesion", "friction_angle")  # written once
+                constant = name in CONSTANT
                 if constant and k:
                     continue
                 group[name] = fields[name] if constant else share * fields[name]

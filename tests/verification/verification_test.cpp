@@ -62,25 +62,26 @@ Errors errors(const Outcome& s)
     const VectorExpression u(*exact.displacement, constants);
     double ds = 0, es = 0, du = 0, eu = 0, l1 = 0, largest = 0;
     const auto X = [&] {  // by id, for scenes of one body
-        std::vector<Vec2> all(s.solver->bodies()[0].points.count);
+        std::vector<Vec<2>> all(s.solver->bodies()[0].points.count);
         const auto first = test::make(s.scene);
-        const Points& q = first->bodies()[0].points;
+        const Points<2>& q = first->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            all[q.id[p]] = {q.x[p], q.y[p]};
+            all[q.id[p]] = {q.x[0][p], q.x[1][p]};
         return all;
     }();
-    const Points& q = s.solver->bodies()[0].points;
+    const Points<2>& q = s.solver->bodies()[0].points;
     for (std::size_t p = 0; p < q.count; ++p)
     {
-        const Vec2 x = X[q.id[p]];
-        const Place at{x[0], x[1], q.x[p], q.y[p], s.t};
+        const Vec<2> x = X[q.id[p]];
+        const Place at{x[0], x[1], q.x[0][p], q.x[1][p], s.t};
         const double a = sxx(at), b = syy(at);
-        const Vec2 w = u(at);
-        ds += (q.sxx[p] - a) * (q.sxx[p] - a) + (q.syy[p] - b) * (q.syy[p] - b) + 2 * q.sxy[p] * q.sxy[p];
+        const Vec<2> w = u(at);
+        ds +=
+            (q.stress[0][p] - a) * (q.stress[0][p] - a) + (q.stress[1][p] - b) * (q.stress[1][p] - b) + 2 * q.stress[2][p] * q.stress[2][p];
         es += a * a + b * b;
-        l1 += std::abs(q.syy[p] - b);
+        l1 += std::abs(q.stress[1][p] - b);
         largest = std::max(largest, std::abs(b));
-        du += std::pow(q.x[p] - x[0] - w[0], 2) + std::pow(q.y[p] - x[1] - w[1], 2);
+        du += std::pow(q.x[0][p] - x[0] - w[0], 2) + std::pow(q.x[1][p] - x[1] - w[1], 2);
         eu += w[0] * w[0] + w[1] * w[1];
     }
     return {std::sqrt(ds / es), l1 / static_cast<double>(q.count) / largest, std::sqrt(du / eu)};
@@ -164,10 +165,10 @@ TEST(SuddenColumn, FirstPeak)
         run("elastic/elastic_column_sudden", method, {"time.end=H*3/c"},
             [&](const Outcome& s)
             {
-                const Points& q = s.solver->bodies()[0].points;
+                const Points<2>& q = s.solver->bodies()[0].points;
                 double lowest = 0, top = 0;
                 for (std::size_t p = 0; p < q.count; ++p)
-                    top = std::max(top, q.y[p]);
+                    top = std::max(top, q.x[1][p]);
                 lowest = 9.875 - top;  // L = 1, four points per cell
                 if (lowest > peak)
                 {
@@ -188,19 +189,19 @@ TEST(FreeFlight, MomentumAndNoStress)
 {
     for (const auto& method : particle_methods)
     {
-        Vec2 start{0, 0};
+        Vec<2> start{0, 0};
         const Outcome s = run("manufactured/free_flight", method, {"constants.ppc=2"},
                               [&](const Outcome& now)
                               {
                                   if (now.t == 0)
                                       start = now.solver->sums().momentum;
                               });
-        const Vec2 end = s.solver->sums().momentum;
+        const Vec<2> end = s.solver->sums().momentum;
         EXPECT_NEAR(end[0] / start[0], 1, 1e-10) << method;
         EXPECT_NEAR(end[1] / start[1], 1, 1e-10) << method;
-        const Points& q = s.solver->bodies()[0].points;
+        const Points<2>& q = s.solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            ASSERT_LT(std::abs(q.sxx[p]) + std::abs(q.syy[p]) + std::abs(q.sxy[p]), 1e-6 * 5e7) << method;
+            ASSERT_LT(std::abs(q.stress[0][p]) + std::abs(q.stress[1][p]) + std::abs(q.stress[2][p]), 1e-6 * 5e7) << method;
     }
 }
 
@@ -268,13 +269,13 @@ traction = ["50", "0"]
             solver->advance(0.01);
         }
         std::vector<std::array<double, 4>> out(solver->bodies()[0].points.count);
-        const Points& q = solver->bodies()[0].points;
+        const Points<2>& q = solver->bodies()[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
-            out[q.id[p]] = {q.x[p], q.y[p], q.sxx[p], q.syy[p]};
+            out[q.id[p]] = {q.x[0][p], q.x[1][p], q.stress[0][p], q.stress[1][p]};
         return std::pair(out, solver->bytes());
     };
-    const auto expect_same =
-        [&](const std::string& text, const std::string& method, std::vector<std::string> overrides, const Vec2& velocity, double tolerance)
+    const auto expect_same = [&](const std::string& text, const std::string& method, std::vector<std::string> overrides,
+                                 const Vec<2>& velocity, double tolerance)
     {
         overrides.push_back(fmt::format("body.block.velocity=[\"{}+0.02*Y\", \"{}-0.02*X\"]", velocity[0], velocity[1]));
         const auto [part, small] = after(text, method, overrides);
@@ -291,7 +292,7 @@ traction = ["50", "0"]
     methods.emplace_back("mpm-bspline");
     for (const auto& method : methods)
     {
-        for (const Vec2& v : {Vec2{3.4, 0}, {-3.4, 0}, {0, 3.4}, {0, -3.4}})
+        for (const Vec<2>& v : {Vec<2>{3.4, 0}, {-3.4, 0}, {0, 3.4}, {0, -3.4}})
             expect_same(scene, method, {}, v, 0);
         expect_same(softening, method, {}, {3.4, 0}, 1e-9);
     }
@@ -312,7 +313,7 @@ TEST(EmptyLattice, HoldsASingleCell)
             solver->prepare(n * 1e-3, 1e-3);
             solver->advance(1e-3);
         }
-        EXPECT_LT(solver->bodies()[0].points.syy[0], 0) << method;
+        EXPECT_LT(solver->bodies()[0].points.stress[1][0], 0) << method;
     }
 }
 

@@ -14,8 +14,6 @@ FORMAT, VERSION = "testbed-result", 1
 
 # Columns of a symmetric tensor in a file: the order of XDMF's Tensor6.
 TENSOR = {"xx": 0, "xy": 1, "xz": 2, "yy": 3, "yz": 4, "zz": 5}
-# Fields that a solver writes into the first snapshot only.
-CONSTANT = ("cohesion", "friction_angle")
 VECTOR = {"x": 0, "y": 1, "z": 2}
 
 
@@ -36,11 +34,13 @@ SCENE_TABLES = {"grid": dict, "report": dict, "probe": list, "wall": list, "mate
 
 
 class Snapshot:
-    """One snapshot: `time` [s], `step`, and its fields as arrays whose row n is material point n."""
+    """One snapshot: `time` [s], `step`, and its fields as arrays whose row n is material point n. `constant`: names of those that stand
+    for all snapshots; the first one has them."""
 
     def __init__(self, result, name, attributes, fields):
         self.result, self.name, self.fields = result, name, fields
         self.time, self.step = attributes.get("time"), attributes.get("step")
+        self.constant = str(attributes.get("constant", "")).split()
         self._cache = {}
 
     def _home(self, field):
@@ -48,7 +48,7 @@ class Snapshot:
         if field in self.fields:
             return self.name
         first = self.result.snapshots[0]
-        return first.name if field in CONSTANT and field in first.fields else ""
+        return first.name if field in first.constant and field in first.fields else ""
 
     def __contains__(self, field):
         return self._home(field) != ""
