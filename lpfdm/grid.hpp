@@ -103,10 +103,9 @@ struct LpfdmGrid
         gather.rebuild<S>(bins, [&](const Index<dim>& at) { return lattice.cell(at); });
         std::vector<std::uint32_t> used;
         for (const auto c : gather.active())
-            for (std::size_t k = 0; k < corners; ++k)
-                used.push_back(static_cast<std::uint32_t>(corner(first_node(c), k)));
-        std::sort(used.begin(), used.end());
-        used.erase(std::unique(used.begin(), used.end()), used.end());
+            used.push_back(static_cast<std::uint32_t>(first_node(c)));
+        for (int d = 0; d < dim; ++d)
+            used = joined(used, used, lattice.node_stride(d));
         used.shrink_to_fit();
         std::vector<std::uint32_t> left;
         std::set_difference(nodes.active().begin(), nodes.active().end(), used.begin(), used.end(), std::back_inserter(left));

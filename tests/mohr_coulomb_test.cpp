@@ -3,6 +3,7 @@
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>
+#include <map>
 
 using namespace testbed;
 
@@ -193,21 +194,25 @@ TEST(MohrCoulomb, TensionBreaksTheCohesion)
     EXPECT_GT(state.plastic_shear_strain, 0);
 }
 
+namespace
+{
+struct Case
+{
+    double friction, cohesion, dilatancy, tension;
+    Softening softening;
+};
+const Case cases[] = {{0.5, 9800, 0, none, Softening{}},
+                      {0.5, 9800, 0, none, Softening::drop(0.5)},
+                      {0.5, 9800, 0.3, 1000, Softening::linear(0.2, 0.5)},
+                      {0, 9800, 0, none, Softening::linear(0.5, 0.3)},
+                      {0, 0, 0, 0, Softening{}},
+                      {0.7, 0, 0.7, none, Softening{}},
+                      {1.4, 1, 0, none, Softening::drop(0)}};
+}  // namespace
+
 /// A million random steps: admissible to 1e-8 of the stress level, finite, and the work exceeds what is stored.
 TEST(MohrCoulomb, RandomPaths)
 {
-    struct Case
-    {
-        double friction, cohesion, dilatancy, tension;
-        Softening softening;
-    };
-    const Case cases[] = {{0.5, 9800, 0, none, Softening{}},
-                          {0.5, 9800, 0, none, Softening::drop(0.5)},
-                          {0.5, 9800, 0.3, 1000, Softening::linear(0.2, 0.5)},
-                          {0, 9800, 0, none, Softening::linear(0.5, 0.3)},
-                          {0, 0, 0, 0, Softening{}},
-                          {0.7, 0, 0.7, none, Softening{}},
-                          {1.4, 1, 0, none, Softening::drop(0)}};
     for (const Case& k : cases)
     {
         test::Random random(7);
@@ -394,6 +399,65 @@ TEST(MohrCoulomb, BatchEqualsPointFunction)
         check(MohrCoulombField<false, true>{law}, false, true);
         check(MohrCoulombField<true, true>{law}, true, true);
     }
+}
+
+/// Packs go every way that the point function goes, face, edges, apex, tension, corner, with and without softening: random steps of all
+/// sizes from states that random steps led to, right to rounding of the trial stress.
+TEST(MohrCoulomb, PacksGoEveryWay)
+{
+    std::map<YieldRegion, int> ways;
+    for (const Case& k : cases)
+    {
+        test::Random random(17);
+        const MohrCoulomb law = law_of(k.friction, k.cohesion, k.dilatancy, k.softening, k.tension);
+        Points<2> q;
+        q.count = pack_size;
+        for (auto& component : q.stress)
+            component.activate(q.count);
+        law.allocate(q);
+        std::vector<State> state(pack_size);
+        std::vector<Gradient<2>> d(pack_size);
+        int softened = 0;
+        for (int n = 0; n < 20000; ++n)
+        {
+            Gradient<2, Pack> packed;
+            for (std::size_t p = 0; p < pack_size; ++p)
+            {
+                if (n % 50 == 0)
+                    state[p] = State{};  // bonds are whole again
+                const double size = std::pow(10.0, random(-6, -2));
+                d[p] = {random(-size, size), random(-size, size), random(-size, size), random(-size, size)};
+                unrolled<4>([&](auto c) { component<c>(packed)[p] = component<c>(d[p]); });
+                unrolled<3>([&](auto c) { q.stress[c][p] = component<c>(state[p].stress); });
+                q.szz[p] = state[p].stress_zz;
+                q.plastic_shear[p] = state[p].plastic_shear_strain;
+            }
+            law.update(q, 0, AllLanes{}, packed);
+            for (std::size_t p = 0; p < pack_size; ++p)
+            {
+                const State before = state[p];
+                law.update(state[p], d[p]);
+                const double size = std::abs(before.stress.xx) + std::abs(before.stress.yy) + std::abs(before.stress_zz) +
+                                    20 * soil.constrained() * (std::abs(d[p].xx) + std::abs(d[p].yy) + std::abs(d[p].shear())) + k.cohesion;
+                const double slack = 1e-12 * size / (1 - std::sin(k.friction));
+                unrolled<3>([&](auto c) { ASSERT_NEAR(q.stress[c][p], component<c>(state[p].stress), slack) << n << ' ' << p; });
+                ASSERT_NEAR(q.szz[p], state[p].stress_zz, slack) << n << ' ' << p;
+                ASSERT_NEAR(q.plastic_shear[p], state[p].plastic_shear_strain, slack / soil.shear()) << n << ' ' << p;
+                softened += law.softening.share(state[p].plastic_shear_strain) < law.softening.share(before.plastic_shear_strain);
+                HypoelasticExactRotation::State<double> elastic{before.stress};
+                HypoelasticExactRotation{soil}.update(elastic, d[p]);
+                const double mean = 0.5 * (elastic.stress.xx + elastic.stress.yy),
+                             radius = std::hypot(0.5 * (elastic.stress.xx - elastic.stress.yy), elastic.stress.xy);
+                Principal trial{mean + radius, mean - radius, before.stress_zz + soil.lame() * d[p].trace()};
+                std::sort(trial.begin(), trial.end(), std::greater<>());
+                ++ways[law.back(trial, law.strength.sin_phi, law.softening.share(state[p].plastic_shear_strain) * k.cohesion)];
+            }
+        }
+        EXPECT_EQ(softened > 100, law.softening.share(1e9) < 1);
+    }
+    for (const YieldRegion way : {YieldRegion::elastic, YieldRegion::face, YieldRegion::left_edge, YieldRegion::right_edge,
+                                  YieldRegion::apex, YieldRegion::tension, YieldRegion::corner})
+        EXPECT_GT(ways[way], 300) << static_cast<int>(way);
 }
 
 /// A strain that is not a number shows in the stress of its point, and in no other.

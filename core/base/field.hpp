@@ -82,6 +82,15 @@ public:
                      });
     }
 
+    /// Value `k` from place `begin` on becomes that of place order[k], by way of `workspace`, too.
+    void reorder(std::span<const std::uint32_t> order, std::size_t begin, double* workspace)
+    {
+        parallel_for(
+            order.size(), [&](std::size_t k) { workspace[k] = static_cast<double>(data_[order[k]]); }, 4096);
+        parallel_for(
+            order.size(), [&](std::size_t k) { data_[begin + k] = static_cast<T>(workspace[k]); }, 4096);
+    }
+
 private:
     std::string_view name_, unit_;
     Output output_;

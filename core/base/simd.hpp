@@ -168,6 +168,11 @@ TESTBED_INLINE inline Pack select(Mask mask, Pack a, Pack b)
     return b;
 }
 
+TESTBED_INLINE inline double select(bool mask, double a, double b)
+{
+    return mask ? a : b;
+}
+
 /// v where it is larger than the threshold, else zero.
 TESTBED_INLINE inline Pack above(Pack v, double threshold)
 {

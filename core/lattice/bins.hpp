@@ -78,10 +78,7 @@ public:
             changed_.clear();
         marked_.assign(bins_.size(), 0);
         if (!moves_.empty())
-        {
-            make_room(workspace, points.count);
-            points.for_each_field([&](auto& field) { field.reorder(moves_, workspace.data()); });
-        }
+            reorder(points, workspace);
         return is_first || has_new || has_lost;
     }
 
@@ -105,10 +102,32 @@ public:
     {
         return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin<dim>) + moves_.capacity() * sizeof(Move) +
                marked_.capacity() +
-               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity()) * sizeof(std::uint32_t);
+               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity() + order_.capacity()) *
+                   sizeof(std::uint32_t);
     }
 
 private:
+    /// As blocks, or one by one where these are short.
+    void reorder(Points<dim>& points, std::vector<double>& workspace)
+    {
+        constexpr std::uint32_t short_block = 8;
+        make_room(workspace, points.count);
+        std::uint32_t begin = none, end = 0, moved = 0;
+        for (const Move& move : moves_)
+        {
+            begin = std::min(begin, move.to);
+            end = std::max(end, move.to + move.count);
+            moved += move.count;
+        }
+        if (moved > short_block * moves_.size())
+            return points.for_each_field([&](auto& field) { field.reorder(moves_, workspace.data()); });
+        order_.resize(end - begin);
+        std::iota(order_.begin(), order_.end(), begin);
+        for (const Move& move : moves_)
+            std::iota(&order_[move.to - begin], &order_[move.to - begin] + move.count, move.from);
+        points.for_each_field([&](auto& field) { field.reorder(order_, begin, workspace.data()); });
+    }
+
     static constexpr std::uint32_t none = ~std::uint32_t{0};
 
     void list_marked()
@@ -167,7 +186,8 @@ private:
     /// Empty bins for the points that have none yet, in the order of cells.
     bool insert_new()
     {
-        std::vector<std::uint32_t> cells;
+        std::vector<std::uint32_t>& cells = new_cells_;
+        cells.clear();
         for_each_marked(
             [&](std::uint32_t, std::uint32_t p)
             {
@@ -180,8 +200,12 @@ private:
         if (cells.empty())
             return false;
         std::sort(cells.begin(), cells.end());
-        const std::vector<Bin<dim>> old = std::exchange(bins_, {});
-        const std::vector<char> old_marked = std::exchange(marked_, {});
+        std::vector<Bin<dim>>& old = old_bins_;
+        std::vector<char>& old_marked = old_marked_;
+        old.swap(bins_);
+        old_marked.swap(marked_);
+        bins_.clear();
+        marked_.clear();
         before_.clear();
         const auto add = [&](const Bin<dim>& bin, char is_marked, std::uint32_t number)
         {
@@ -320,6 +344,10 @@ private:
     std::vector<std::uint32_t> changed_;
     std::vector<std::uint32_t> next_;  ///< where the next point of each bin goes
     std::vector<Move> moves_;
+    std::vector<std::uint32_t> order_;  ///< where points come from, if most of them move alone
+    std::vector<std::uint32_t> new_cells_;
+    std::vector<Bin<dim>> old_bins_;  ///< room for the lists before new bins came
+    std::vector<char> old_marked_;
     std::size_t size_before_ = 0;
 };
 

@@ -145,52 +145,72 @@ protected:
         s = {new_mean + ratio * half, new_mean - ratio * half, ratio * s.xy};
     }
 
+    /// Principal stresses of a pack of points, and the way back.
+    struct Directions
+    {
+        Pack half, xy, radius;
+        Mask zz_first, zz_last;
+        std::array<Pack, 3> stress;  ///< descending
+
+        TESTBED_INLINE explicit Directions(const State<Pack>& state)
+            : half(Pack(0.5) * (state.stress.xx - state.stress.yy)),
+              xy(state.stress.xy),
+              radius(sqrt(half * half + xy * xy))
+        {
+            const Pack mean = Pack(0.5) * (state.stress.xx + state.stress.yy), zz = state.stress_zz;
+            const Pack high = mean + radius, low = mean - radius;
+            zz_first = zz > high;
+            zz_last = zz < low;
+            stress = {max(high, zz), select(zz_first, high, select(zz_last, low, zz)), min(low, zz)};
+        }
+        /// Sets the stress of some lanes to that with principal stresses n in these directions.
+        TESTBED_INLINE void give(State<Pack>& state, const std::array<Pack, 3>& n, Mask lanes) const
+        {
+            const Pack high = select(zz_first, n[1], n[0]), low = select(zz_last, n[1], n[2]), mean = Pack(0.5) * (high + low);
+            const Pack ratio = Pack(0.5) * (high - low) / select(radius > Pack(0.0), radius, Pack(1.0));
+            state.stress = {select(lanes, mean + ratio * half, state.stress.xx), select(lanes, mean - ratio * half, state.stress.yy),
+                            select(lanes, ratio * xy, state.stress.xy)};
+            state.stress_zz = select(lanes, select(zz_first, n[0], select(zz_last, n[2], n[1])), state.stress_zz);
+        }
+    };
+
     /// The return of the lanes of `yields` that end on a face with the cohesion that is left after a large strain, or is given. Returns the
     /// lanes of `yields` that end elsewhere; they are left as they are.
     template <class Driver>
     TESTBED_INLINE Mask return_to_face(State<Pack>& state, const Strength<Pack>& point, Driver, Pack given, Mask yields) const
     {
-        SymTensor<2, Pack>& s = state.stress;
-        const Pack mean = Pack(0.5) * (s.xx + s.yy), half = Pack(0.5) * (s.xx - s.yy), radius = sqrt(half * half + s.xy * s.xy);
-        const Pack high = mean + radius, low = mean - radius, zz = state.stress_zz;
-        const Mask zz_first = zz > high, zz_last = zz < low;
-        std::array<Pack, 3> n{max(high, zz), select(zz_first, high, select(zz_last, low, zz)), min(low, zz)};
-
+        const Directions trial(state);
+        std::array<Pack, 3> n = trial.stress;
         const Pack share = softening.share(Driver::at_end(Pack(std::numeric_limits<double>::max()), given));
         const Pack F = back.yield_function(n[0], n[2], point.sin_phi, share * point.cohesion);
         const Pack multiplier = F / back.face_stiffness(point.sin_phi);
         const Pack strain = state.plastic_shear_strain + Pack(2.0) * multiplier;
-        const Pack driver = Driver::at_end(strain, given);
         back.flow(n, 0, 2, multiplier);
         const Mask on_face = yields && F > Pack(0.0) && n[0] >= n[1] && n[1] >= n[2] && n[0] <= Pack(back.tensile_strength()) &&
-                             driver == driver && softening.share(driver) <= share;  // not NaN, which share() may lose
-
-        const Pack new_high = select(zz_first, n[1], n[0]), new_low = select(zz_last, n[1], n[2]);
-        const Pack new_mean = Pack(0.5) * (new_high + new_low);
-        const Pack ratio = Pack(0.5) * (new_high - new_low) / select(radius > Pack(0.0), radius, Pack(1.0));
-        s = {select(on_face, new_mean + ratio * half, s.xx), select(on_face, new_mean - ratio * half, s.yy),
-             select(on_face, ratio * s.xy, s.xy)};
-        state.stress_zz = select(on_face, select(zz_first, n[0], select(zz_last, n[2], n[1])), zz);
+                             softening.share(Driver::at_end(strain, given)) <= share;
+        trial.give(state, n, on_face);
         state.plastic_shear_strain = select(on_face, strain, state.plastic_shear_strain);
         return yields && !on_face;
     }
 
-    /// plastic() for each lane of `rest`. Not inlined, so that the kernel keeps its registers where no lane comes here.
+    /// plastic() for the lanes of `rest`. Not inlined, so that the kernel keeps its registers where no lane comes here.
     template <class Driver>
-    [[gnu::noinline]] State<Pack> plastic_lanes(State<Pack> state, const Strength<Pack>& point, Driver driver, Pack given, Mask rest) const
+    [[gnu::noinline]] State<Pack> plastic(State<Pack> state, const Strength<Pack>& point, Driver, Pack given, Mask rest) const
     {
-        for (std::size_t k = 0; k < pack_size; ++k)
-            if (rest[k])
-            {
-                State<double> one{
-                    {state.stress.xx[k], state.stress.yy[k], state.stress.xy[k]}, state.stress_zz[k], state.plastic_shear_strain[k]};
-                plastic(one, Strength<>{point.cohesion[k], point.sin_phi[k]}, driver, given[k]);
-                state.stress.xx[k] = one.stress.xx;
-                state.stress.yy[k] = one.stress.yy;
-                state.stress.xy[k] = one.stress.xy;
-                state.stress_zz[k] = one.stress_zz;
-                state.plastic_shear_strain[k] = one.plastic_shear_strain;
-            }
+        const Directions trial(state);
+        const Pack own = state.plastic_shear_strain;
+        std::array<Pack, 3> n = trial.stress;
+        const auto excess = [&](Pack share, Mask open)
+        {
+            const std::array<Pack, 3> returned = back(trial.stress, point.sin_phi, share * point.cohesion);
+            const Pack strain = own + back.plastic_shear(trial.stress, returned);
+            for (std::size_t k = 0; k < 3; ++k)
+                n[k] = select(open, returned[k], n[k]);
+            state.plastic_shear_strain = select(open, strain, state.plastic_shear_strain);
+            return share - softening.share(Driver::at_end(strain, given));
+        };
+        softening.solve(excess, Driver::at_end(own, given), rest);
+        trial.give(state, n, rest);
         return state;
     }
 
@@ -204,7 +224,7 @@ protected:
         if (const Mask yields = lanes.keep(!inside(state, point, given)); stdx::any_of(yields))
         {
             if (const Mask rest = return_to_face(state, point, driver, given, yields); stdx::any_of(rest))
-                state = plastic_lanes(state, point, driver, given, rest);
+                state = plastic(state, point, driver, given, rest);
             lanes.store(&q.plastic_shear[p], state.plastic_shear_strain);
         }
         q.set_stress(p, lanes, state.stress);

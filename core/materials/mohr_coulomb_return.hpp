@@ -81,19 +81,33 @@ public:
         return YieldRegion::corner;
     }
 
+    /// The same for packs: each lane goes the way that the numbers in it ask for.
+    std::array<Pack, 3> operator()(const std::array<Pack, 3>& trial, Pack sin_phi, Pack cohesion) const
+    {
+        std::array<Pack, 3> s = on_shear_surface(trial, sin_phi, cohesion);
+        if (const Mask torn = !(s[0] <= Pack(tensile_strength_)); stdx::any_of(torn))
+        {
+            const std::array<Pack, 3> cut = without_tension(trial);
+            const Mask outside = yield_function(cut[0], cut[2], sin_phi, cohesion) > Pack(0.0);
+            s = select(torn, stdx::any_of(torn && outside) ? select(outside, at_corner(trial, sin_phi, cohesion), cut) : cut, s);
+        }
+        return s;
+    }
+
     /// Increment of the plastic shear strain from the trial to the returned stress: major minus minor principal plastic strain,
     /// the minor one counted not above zero, so that failure in tension counts, too. In simple shear this is gamma.
-    double plastic_shear(const Principal& trial, const Principal& s) const
+    template <class T>
+    T plastic_shear(const std::array<T, 3>& trial, const std::array<T, 3>& s) const
     {
         const double E = moduli_.youngs_modulus(), nu = moduli_.poissons_ratio();
-        const Principal d{trial[0] - s[0], trial[1] - s[1], trial[2] - s[2]};
-        const double sum = d[0] + d[1] + d[2];
-        double major = 0, minor = 0;
-        for (const double di : d)
+        const std::array<T, 3> d{trial[0] - s[0], trial[1] - s[1], trial[2] - s[2]};
+        const T sum = d[0] + d[1] + d[2];
+        T major(0.0), minor(0.0);
+        for (const T& di : d)
         {
-            const double strain = ((1 + nu) * di - nu * sum) / E;
-            major = std::max(major, strain);
-            minor = std::min(minor, strain);
+            const T strain = (T(1 + nu) * di - T(nu) * sum) / T(E);
+            major = max(major, strain);
+            minor = min(minor, strain);
         }
         return major - minor;
     }
@@ -148,6 +162,64 @@ private:
         const double determinant = moduli_.constrained() * d3 - lame * d1;
         const double opening = (r1 * d3 - r3 * d1) / determinant, shear = (moduli_.constrained() * r3 - lame * r1) / determinant;
         s = {limit, std::clamp(s[1] - lame * opening - volumetric * shear, low, limit), low};
+    }
+
+    static std::array<Pack, 3> select(Mask mask, const std::array<Pack, 3>& a, const std::array<Pack, 3>& b)
+    {
+        return {testbed::select(mask, a[0], b[0]), testbed::select(mask, a[1], b[1]), testbed::select(mask, a[2], b[2])};
+    }
+
+    std::array<Pack, 3> on_shear_surface(const std::array<Pack, 3>& trial, Pack sin_phi, Pack cohesion) const
+    {
+        const Pack F = yield_function(trial[0], trial[2], sin_phi, cohesion), same = face_stiffness(sin_phi);
+        std::array<Pack, 3> face = trial;
+        flow(face, 0, 2, F / same);
+        const Mask yields = !(F <= Pack(0.0)), beside = yields && !(face[0] >= face[1] && face[1] >= face[2]);
+        const std::array<Pack, 3> s = select(yields, face, trial);
+        return stdx::any_of(beside) ? select(beside, on_edge(trial, face[1] > face[0], F, same, sin_phi, cohesion), s) : s;
+    }
+
+    /// The left edge, or the right one, or the apex. @param F, same of the face between the largest and the smallest stress
+    std::array<Pack, 3> on_edge(const std::array<Pack, 3>& trial, Mask left, Pack F, Pack same, Pack sin_phi, Pack cohesion) const
+    {
+        using testbed::select;
+        const Pack one(1.0), none(0.0);
+        const Pack F2 = yield_function(select(left, trial[1], trial[0]), select(left, trial[2], trial[1]), sin_phi, cohesion);
+        const Pack sides = select(left, (one - sin_phi) * Pack(1 - sin_psi_), (one + sin_phi) * Pack(1 + sin_psi_));
+        const Pack other = Pack(4 * (moduli_.lame() * sin_psi_)) * sin_phi + Pack(2 * moduli_.shear()) * sides;
+        const Pack inverse = one / (same * same - other * other), second = (same * F2 - other * F) * inverse;
+        std::array<Pack, 3> s = trial;
+        flow(s, 0, 2, (same * F - other * F2) * inverse);
+        const Pack volumetric = Pack(2 * moduli_.lame() * sin_psi_) * second, shear = Pack(2 * moduli_.shear()) * second;
+        const Pack down = shear * Pack(1 + sin_psi_), up = shear * Pack(1 - sin_psi_);
+        s[0] -= volumetric + select(left, none, down);
+        s[1] -= volumetric + select(left, down, -up);
+        s[2] -= volumetric - select(left, up, none);
+        const Pack mean = Pack(0.5) * (s[1] + select(left, s[0], s[2]));
+        s = {select(left, mean, s[0]), mean, select(left, s[2], mean)};
+        const Mask beyond = !(s[0] >= s[2]) && sin_phi != none;
+        const Pack apex = cohesion * sqrt(one - sin_phi * sin_phi) / sin_phi;
+        return {select(beyond, apex, s[0]), select(beyond, apex, s[1]), select(beyond, apex, s[2])};
+    }
+
+    std::array<Pack, 3> without_tension(const std::array<Pack, 3>& s) const
+    {
+        const Pack limit(tensile_strength_), share(moduli_.lame() / moduli_.constrained()), above = s[0] - limit;
+        const Pack second = s[1] - share * above, third = s[2] - share * above;
+        const Pack of_both = min(limit, s[2] - share / (Pack(1.0) + share) * (above + s[1] - limit));
+        const Mask one = second <= limit;
+        return {limit, testbed::select(one, second, limit), testbed::select(one, third, of_both)};
+    }
+
+    std::array<Pack, 3> at_corner(const std::array<Pack, 3>& s, Pack sin_phi, Pack cohesion) const
+    {
+        const Pack one(1.0), limit(tensile_strength_);
+        const Pack low = (limit * (one + sin_phi) - Pack(2.0) * cohesion * sqrt(one - sin_phi * sin_phi)) / (one - sin_phi);
+        const double lame = moduli_.lame(), M = moduli_.constrained(), volumetric = 2 * lame * sin_psi_;
+        const double d1 = volumetric + 2 * moduli_.shear() * (1 + sin_psi_), d3 = volumetric - 2 * moduli_.shear() * (1 - sin_psi_);
+        const Pack r1 = s[0] - limit, r3 = s[2] - low, inverse(1 / (M * d3 - lame * d1));
+        const Pack opening = (r1 * Pack(d3) - r3 * Pack(d1)) * inverse, shear = (Pack(M) * r3 - Pack(lame) * r1) * inverse;
+        return {limit, max(low, min(limit, s[1] - Pack(lame) * opening - Pack(volumetric) * shear)), low};
     }
 
     ElasticModuli moduli_;

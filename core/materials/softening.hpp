@@ -17,10 +17,12 @@ public:
     /// @param strain plastic shear strain at which the residual is reached; crack-band scaling divides it by L / t_sb
     static Softening linear(double residual, double strain) { return {residual, (1 - residual) / strain}; }
 
+    /// NaN of NaN.
     template <class T>
     TESTBED_INLINE T share(const T& strain) const
     {
-        return max(T(residual_), T(1.0) - T(slope_) * strain);
+        const T fallen = T(1.0) - T(slope_) * strain;
+        return select(fallen < T(residual_), T(residual_), fallen);
     }
 
     /// Finds the share at which excess(share) = share - share(strain that the return with it leads to) vanishes, and leaves
@@ -54,6 +56,32 @@ public:
                 f_high *= stuck == -1 ? 0.5 : 1;
                 stuck = -1;
             }
+        }
+    }
+
+    /// The same for the lanes of a pack: excess(share, open) gives the excess, and keeps in the open lanes what belongs to it.
+    template <class Excess>
+    void solve(Excess&& excess, Pack strain, Mask lanes) const
+    {
+        Pack low(residual_), high = share(strain), f_low = excess(low, lanes);
+        Mask open = lanes && !(f_low >= Pack(0.0) || high <= low);
+        if (!stdx::any_of(open))
+            return;
+        const Pack one(1.0), half(0.5);
+        Pack f_high = excess(high, open), stuck(0.0);
+        for (int k = 0; k < 100; ++k)
+        {
+            open = open && f_high > Pack(0.0);
+            if (!stdx::any_of(open))
+                return;
+            const Pack next = high - f_high * (high - low) / (f_high - f_low), f = excess(next, open);
+            open = open && !(max(f, -f) < Pack(1e-14) || high - low < Pack(1e-15));
+            const Mask above = f > Pack(0.0);
+            f_low = select(above, f_low * select(stuck == one, half, one), f);
+            f_high = select(above, f, f_high * select(stuck == -one, half, one));
+            high = select(above, next, high);
+            low = select(above, low, next);
+            stuck = select(above, one, -one);
         }
     }
 
