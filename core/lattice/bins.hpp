@@ -102,7 +102,7 @@ public:
     {
         return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin<dim>) + moves_.capacity() * sizeof(Move) +
                marked_.capacity() +
-               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity() + order_.capacity()) *
+               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity()) *
                    sizeof(std::uint32_t);
     }
 
@@ -121,11 +121,11 @@ private:
         }
         if (moved > short_block * moves_.size())
             return points.for_each_field([&](auto& field) { field.reorder(moves_, workspace.data()); });
-        order_.resize(end - begin);
-        std::iota(order_.begin(), order_.end(), begin);
+        std::vector<std::uint32_t> order(end - begin);
+        std::iota(order.begin(), order.end(), begin);
         for (const Move& move : moves_)
-            std::iota(&order_[move.to - begin], &order_[move.to - begin] + move.count, move.from);
-        points.for_each_field([&](auto& field) { field.reorder(order_, begin, workspace.data()); });
+            std::iota(&order[move.to - begin], &order[move.to - begin] + move.count, move.from);
+        points.for_each_field([&](auto& field) { field.reorder(order, begin, workspace.data()); });
     }
 
     static constexpr std::uint32_t none = ~std::uint32_t{0};
@@ -344,7 +344,6 @@ private:
     std::vector<std::uint32_t> changed_;
     std::vector<std::uint32_t> next_;  ///< where the next point of each bin goes
     std::vector<Move> moves_;
-    std::vector<std::uint32_t> order_;  ///< where points come from, if most of them move alone
     std::vector<std::uint32_t> new_cells_;
     std::vector<Bin<dim>> old_bins_;  ///< room for the lists before new bins came
     std::vector<char> old_marked_;
