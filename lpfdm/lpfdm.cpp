@@ -145,7 +145,7 @@ public:
     std::size_t bytes() const override
     {
         const std::size_t numbers =
-            frontier_.mass_before.capacity() + 2 * hourglass_[0].capacity() + cell_weight_.capacity() + 2 * cell_force_.capacity();
+            frontier_.mass_before.capacity() + 2 * hourglass_[0].capacity() + cell_weight_.capacity() + 2 * cell_force_[0].capacity();
         return this->bytes_of_points_and_loads() + grid_.bytes() + sums_.bytes() + mid_steps_.bytes() + (faces_ ? faces_->bytes() : 0) +
                numbers * sizeof(double);
     }
@@ -251,7 +251,8 @@ private:
         if constexpr (Support::has_box)
             mid_steps_.resize(to.nodes());
         if (body_force_)
-            cell_force_.assign(to.cells(), {0, 0});
+            for (auto& component : cell_force_)
+                component.assign(to.cells(), 0.0);
         if (weight_)
             cell_weight_.assign(to.cells(), 0.0);
         if (cloud_.nonlocal)
@@ -282,12 +283,20 @@ private:
     void add_body_force() override
     {
         body_force_->template apply<Support>(grid_.lattice, bodies_, grid_.gather,
-                                             [&](std::size_t c, const std::array<double, 2>& f) { cell_force_[c] = f; });
-        for (const auto n : nodes_.active())
-            for (std::size_t k = 0; k < 4; ++k)
-                if (const std::size_t c = grid_.around(grid_.first_cell(n), k); grid_.cells.mass[c] > 0)
-                    for (std::size_t d = 0; d < 2; ++d)
-                        nodes_.f[d][n] += 0.25 * cell_force_[c][d];
+                                             [&](std::size_t c, const Vec<2>& f) { set(cell_force_, c, f); });
+        grid_.for_each_node(
+            [&](std::size_t n, std::size_t first_cell, const auto& lanes)
+            {
+                Vec<2, Pack> f = load(nodes_.f, n, lanes);
+                unrolled<4>(
+                    [&](auto k)
+                    {
+                        const std::size_t c = grid_.around(first_cell, k);
+                        const Mask is_full = lanes.load(&grid_.cells.mass[c]) > Pack(0.0);  // what an empty cell holds is of another step
+                        unrolled<2>([&](auto d) { f[d] += Pack(0.25) * select(is_full, lanes.load(&cell_force_[d][c]), Pack(0.0)); });
+                    });
+                store(nodes_.f, n, lanes, f);
+            });
     }
 
     LpfdmGrid<2> grid_;
@@ -298,7 +307,7 @@ private:
     MidSteps mid_steps_;               ///< empty for points without a box
     LpfdmSums<Support> sums_;          ///< up to date from the end of a step on, but for bins that points left
     VectorField<2> hourglass_;         ///< empty unless the scene has them
-    std::vector<Vec<2>> cell_force_;   ///< so, too
+    VectorField<2> cell_force_;        ///< so, too
     std::vector<double> cell_weight_;  ///< so, too
     std::optional<FreeFaces> faces_;   ///< so, too
     double wave_speed_ = 0;

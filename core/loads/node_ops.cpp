@@ -61,8 +61,7 @@ NodeOps::NodeOps(const Scene& scene, const Lattice<2>& lattice)
 void NodeOps::begin_step(const Step& step)
 {
     power_ = {};
-    for (auto& component : load_)
-        component.clear();
+    is_loaded_ = false;
     for (std::size_t k = 0; k < walls_.size(); ++k)
     {
         Restraint& own = restraints_[first_wall_ + k];
@@ -96,10 +95,9 @@ void NodeOps::apply_forces(const Lattice<2>& lattice, Nodes<2>& nodes, const Ste
 
 double NodeOps::load_power(const Nodes<2>& nodes) const
 {
-    double power = 0;
-    for (const auto n : nodes.active())
-        power += total<2>([&](auto d) { return load_[d][n] * nodes.v[d][n]; });
-    return power;
+    const auto power = [&](std::size_t i, const auto& lanes)
+    { return std::array{total<2>([&](auto d) { return lanes.load(&load_[d][i]) * lanes.load(&nodes.v[d][i]); })}; };
+    return sum_over_nodes<1>(nodes, power)[0];
 }
 
 void NodeOps::add_work(const Kick& kick, double loads, double dt, NodalWork& work) const
@@ -114,10 +112,9 @@ void NodeOps::add_work(const Kick& kick, double loads, double dt, NodalWork& wor
 
 void NodeOps::kick(Nodes<2>& nodes, double dt)
 {
-    const bool loaded = !load_[0].empty();
-    const double before = loaded ? load_power(nodes) : 0;
+    const double before = is_loaded_ ? load_power(nodes) : 0;
     const Kick kick = damping_ ? accelerate(nodes, weight_of(nodes), dt, *damping_) : accelerate(nodes, weight_of(nodes), dt);
-    add_work(kick, loaded ? 0.5 * (before + load_power(nodes)) : 0, dt, work_);
+    add_work(kick, is_loaded_ ? 0.5 * (before + load_power(nodes)) : 0, dt, work_);
 }
 
 NodalWork NodeOps::work(const Nodes<2>& nodes, double lag) const
@@ -135,7 +132,7 @@ NodalWork NodeOps::work(const Nodes<2>& nodes, double lag) const
                                          return std::array{m * v[0], m * v[1], taken};
                                      });
     NodalWork now = work_;
-    add_work({lag * nodal_power(nodes), {lag * s[0], lag * s[1]}, lag * s[2]}, load_[0].empty() ? 0 : load_power(nodes), lag, now);
+    add_work({lag * nodal_power(nodes), {lag * s[0], lag * s[1]}, lag * s[2]}, is_loaded_ ? load_power(nodes) : 0, lag, now);
     return now;
 }
 

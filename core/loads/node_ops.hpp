@@ -10,6 +10,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 namespace testbed
 {
@@ -152,13 +153,22 @@ public:
     template <class Load>
     void apply_load(const Nodes<2>& nodes, Load&& load)
     {
-        before_ = nodes.f;
-        for (auto& component : load_)
-            component.resize(nodes.mass.size());
+        for (auto* field : {&before_, &load_})
+            for (auto& component : *field)
+                component.resize(nodes.mass.size());
+        nodes.for_each([&](std::size_t i, const auto& lanes) { store(before_, i, lanes, testbed::load(nodes.f, i, lanes)); });
         load();
-        for (std::size_t d = 0; d < load_.size(); ++d)
-            for (const auto n : nodes.active())
-                load_[d][n] += nodes.f[d][n] - before_[d][n];
+        const bool has_others = std::exchange(is_loaded_, true);
+        nodes.for_each(
+            [&](std::size_t i, const auto& lanes)
+            {
+                unrolled<2>(
+                    [&](auto d)
+                    {
+                        const Pack given = lanes.load(&nodes.f[d][i]) - lanes.load(&before_[d][i]);
+                        lanes.store(&load_[d][i], has_others ? lanes.load(&load_[d][i]) + given : given);
+                    });
+            });
     }
     /// Power that hourglass control takes from the motion in the coming kick [W/m].
     void note_hourglass(double power) { power_.hourglass = power; }
@@ -203,6 +213,7 @@ private:
     DrivenNodes driven_;
     NodalWork work_, power_;  ///< power: of the coming step, where it is not known to the kick [W/m]
     Vec<2> gravity_now_{0, 0};
+    bool is_loaded_ = false;        ///< whether load_ is of this step
     VectorField<2> load_, before_;  ///< empty in a scene without loads
     std::size_t seen_ = 0;          ///< version of the nodes for which driven_ was found; 0: none
 };
