@@ -2,7 +2,7 @@
 import pytest
 from synthetic import write_study
 from testbed_reports.grade.dataset import read_study_folder
-from testbed_reports.grade.targets import as_text, judge, number
+from testbed_reports.grade.targets import as_text, judge, mean_by_size, number
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +106,18 @@ def test_convergence_that_ends_is_none(tmp_path):
     found = read_study_folder(write_study(tmp_path / "column", metrics="stress", models={"lpfdm": stays.__getitem__}))
     assert verdict(found, "not_converging").verdict == "pass"
     assert verdict(found, "order_min", value=1.0).verdict == "pass"
+
+
+def test_a_size_counts_with_the_mean_of_its_runs():
+    """Of offsets of points from the lattice, say: one that lies far out counts, and one without a number is told."""
+    class Run:
+        def __init__(self, size, value):
+            self.values, self._value = {"L": size}, value
+
+        def value(self, quantity, norm):
+            return self._value
+
+    runs = [Run(0.5, v) for v in (1.0, 1.0, 4.0)] + [Run(0.25, 3.0), Run(0.25, float("nan")), Run("none", 1.0)]
+    sizes, means, lost = mean_by_size(runs, "stress", "max")
+    assert sizes.tolist() == [0.25, 0.5] and means.tolist() == [3.0, 2.0]
+    assert lost == [runs[4]]
