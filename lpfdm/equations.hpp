@@ -4,8 +4,6 @@
 #include "core/bodies/bin_sums.hpp"
 #include "lpfdm/grid.hpp"
 
-#include <atomic>
-
 namespace testbed
 {
 /// What the points of one bin give to its S x S cells: mass and, times volume, the stress beyond the confining pressure.

@@ -26,7 +26,7 @@ void set_initial_velocity(LpfdmGrid<2>& grid, const Scene& scene, const std::vec
                 {
                     const std::size_t n = grid.corner(grid.lattice.node(bin.at + block_index<S, 2>(k)), corner);
                     const Vec<2> x = grid.lattice.node_position(n);
-                    const double m = 0.25 * sums[block * 4];
+                    const double m = 0.25 * sums[block * (1 + symmetric_components<2>)];
                     mass[n] += m;
                     if (!velocity)
                         continue;

@@ -235,8 +235,8 @@ private:
     void find_weight() override
     {
         weight_->nodes.assign(nodes_.mass.size(), 0.0);
-        weight_->template collect<4>(bodies_, grid_.gather, sums_.all(), block_size<S, 2>,
-                                     [&](std::size_t c, double mass) { cell_weight_[c] = mass; });
+        weight_->template collect<1 + symmetric_components<2>>(bodies_, grid_.gather, sums_.all(), block_size<S, 2>,
+                                                               [&](std::size_t c, double mass) { cell_weight_[c] = mass; });
         for (const auto c : grid_.gather.active())
             for (std::size_t k = 0; k < 4; ++k)
                 weight_->nodes[grid_.corner(grid_.first_node(c), k)] += 0.25 * cell_weight_[c];

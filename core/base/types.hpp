@@ -118,7 +118,7 @@ TESTBED_INLINE inline const T& component(const Gradient<dim, T>& g)
     return component<gradient_component<dim>(i, j)>(g);
 }
 
-/// Packs are not zero from the start.
+/// Component by component, as set_zero().
 template <int dim>
 TESTBED_INLINE inline Gradient<dim, Pack> zero_gradient()
 {

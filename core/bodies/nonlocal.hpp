@@ -27,9 +27,9 @@ public:
     void resize(std::size_t stride, std::size_t entities);
 
     /// Sets the softening strain of all points whose law asks for it, from their plastic shear strain.
-    /// @param index Index<2> -> number of the cell or node
-    template <class Support, class Index>
-    void apply(const Lattice<2>& lattice, std::vector<Body>& bodies, const Gather& gather, Index&& index)
+    /// @param number Index<2> -> number of the cell or node
+    template <class Support, class Number>
+    void apply(const Lattice<2>& lattice, std::vector<Body>& bodies, const Gather& gather, Number&& number)
     {
         partial_.assign(gather.blocks() * 2, 0.0);
         std::size_t first_bin = 0;
@@ -52,7 +52,7 @@ public:
             {
                 Points<2>& q = bodies[b].points;
                 const Pack m(over_nonlocal_[b]);
-                interpolate<Support>(lattice, bodies[b], mean_, index,
+                interpolate<Support>(lattice, bodies[b], mean_, number,
                                      [&](std::size_t p, const auto& lanes, Pack mean)
                                      {
                                          const Pack driver = (Pack(1.0) - m) * lanes.load(&q.plastic_shear[p]) + m * mean;

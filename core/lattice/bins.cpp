@@ -16,7 +16,7 @@ void Bins<dim>::reorder(Points<dim>& points, std::vector<double>& workspace)
         end = std::max(end, move.to + move.count);
         moved += move.count;
     }
-    if (moved > short_block * moves_.size())
+    if (moved > short_block * moves_.size() || moved < (end - begin) / 4)
         return points.for_each_field([&](auto& field) { field.reorder(moves_, workspace.data()); });
     std::vector<std::uint32_t> order(end - begin);
     std::iota(order.begin(), order.end(), begin);

@@ -101,12 +101,13 @@ public:
     std::size_t bytes() const
     {
         return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin<dim>) + moves_.capacity() * sizeof(Move) +
-               marked_.capacity() +
-               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity()) * sizeof(std::uint32_t);
+               marked_.capacity() + old_marked_.capacity() + old_bins_.capacity() * sizeof(Bin<dim>) +
+               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity() + new_cells_.capacity()) *
+                   sizeof(std::uint32_t);
     }
 
 private:
-    /// As blocks, or one by one where these are short.
+    /// Block by block, or all between the first and the last that moves by one permutation where most of these move alone.
     void reorder(Points<dim>& points, std::vector<double>& workspace);
 
     static constexpr std::uint32_t none = ~std::uint32_t{0};

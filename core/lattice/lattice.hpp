@@ -87,7 +87,6 @@ struct CellBox
             high[d] = std::max(high[d], other.high[d]);
         }
     }
-    bool is_empty() const { return low[0] >= high[0]; }
     static CellBox none() { return {all<dim>(std::numeric_limits<int>::max()), all<dim>(std::numeric_limits<int>::min())}; }
 };
 

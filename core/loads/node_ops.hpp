@@ -185,7 +185,10 @@ public:
         for (std::size_t k = 0; k < walls_.size(); ++k)
             a.group("wall/" + restraints_[first_wall_ + k].name, [&] { walls_[k].state(a, restraints_[first_wall_ + k]); });
         if constexpr (Archive::reads)
+        {
             seen_ = 0;
+            is_loaded_ = false;
+        }
     }
     bool restrains() const { return !restraints_.empty(); }
     std::vector<RestraintRecord> records() const;

@@ -22,7 +22,7 @@ enum class YieldRegion
     corner    ///< tensile strength and Mohr-Coulomb together
 };
 
-/// Elastic constants and flow of a Mohr-Coulomb law, with the return of one stress for a given cohesion.
+/// Elastic constants and flow of a Mohr-Coulomb law, with the return of one stress, or a pack of them, for a given cohesion.
 class MohrCoulombReturn
 {
 public:

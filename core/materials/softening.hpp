@@ -59,7 +59,8 @@ public:
         }
     }
 
-    /// The same for the lanes of a pack: excess(share, open) gives the excess, and keeps in the open lanes what belongs to it.
+    /// The same for the lanes of a pack: excess(share, open) gives the excess, and keeps in the open lanes alone what
+    /// belongs to it; in the others the shares are of no meaning.
     template <class Excess>
     void solve(Excess&& excess, Pack strain, Mask lanes) const
     {
