@@ -5,8 +5,8 @@
 #include "core/bodies/bin_sums.hpp"
 #include "core/bodies/support.hpp"
 #include "core/lattice/gather.hpp"
-#include "core/lattice/nodes.hpp"
 #include "core/lattice/kinematics.hpp"
+#include "core/lattice/nodes.hpp"
 
 namespace testbed
 {
