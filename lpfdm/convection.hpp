@@ -30,7 +30,7 @@ struct UpwindConvection
     TESTBED_INLINE static Gradient<dim, Pack> gradient(const LpfdmGrid<dim>& grid, std::size_t first_cell, const Lanes& lanes,
                                                        const Vec<dim, Pack>& courant)
     {
-        Gradient<dim, Pack> g = zero_gradient<dim>();
+        Gradient<dim, Pack> g;
         unrolled<LpfdmGrid<dim>::corners>(
             [&](auto k) TESTBED_INLINE
             {
@@ -63,7 +63,7 @@ struct CentralConvection
                                                        const Vec<dim, Pack>& courant)
     {
         const Pack one(1.0);
-        Gradient<dim, Pack> mean = zero_gradient<dim>();
+        Gradient<dim, Pack> mean;
         Pack total(0.0);
         unrolled<LpfdmGrid<dim>::corners>(
             [&](auto k) TESTBED_INLINE

@@ -220,11 +220,7 @@ private:
             sum.mean = (1 / sum.mass) * sum.mean;
         return sum;
     }
-    Gradient<2> gradient_at(std::size_t node) const
-    {
-        const std::array<double, 4> g = testbed::at(gradient_, node);
-        return {g[0], g[1], g[2], g[3]};
-    }
+    Gradient<2> gradient_at(std::size_t node) const { return tensor_of<Gradient<2>>(testbed::at(gradient_, node)); }
 
     std::vector<double> one_sided_;  ///< 1 at nodes of faces_ and ahead_
     VectorField<4> gradient_;        ///< of the increment at nodes

@@ -18,25 +18,16 @@ struct Cells
     {
         for_each_component([&](auto& values) { values.resize(n); });
     }
-    Gradient<dim> gradient_at(std::size_t c) const
+    Gradient<dim> gradient_at(std::size_t c) const { return tensor_of<Gradient<dim>>(at(gradient, c)); }
+    template <class Lanes>
+    TESTBED_INLINE Gradient<dim, Pack> gradient_at(std::size_t c, const Lanes& lanes) const
     {
-        Gradient<dim> g;
-        unrolled<dim * dim>([&](auto k) { component<k>(g) = gradient[k][c]; });
-        return g;
+        return tensor_of<Gradient<dim, Pack>>(load(gradient, c, lanes));
     }
     template <class Lanes>
-    Gradient<dim, Pack> gradient_at(std::size_t c, const Lanes& lanes) const
+    TESTBED_INLINE SymTensor<dim, Pack> stress_at(std::size_t c, const Lanes& lanes) const
     {
-        Gradient<dim, Pack> g;
-        unrolled<dim * dim>([&](auto k) TESTBED_INLINE { component<k>(g) = lanes.load(&gradient[k][c]); });
-        return g;
-    }
-    template <class Lanes>
-    SymTensor<dim, Pack> stress_at(std::size_t c, const Lanes& lanes) const
-    {
-        SymTensor<dim, Pack> s;
-        unrolled<symmetric_components<dim>>([&](auto k) TESTBED_INLINE { component<k>(s) = lanes.load(&stress[k][c]); });
-        return s;
+        return tensor_of<SymTensor<dim, Pack>>(load(stress, c, lanes));
     }
     void clear(std::size_t c)
     {

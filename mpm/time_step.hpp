@@ -118,22 +118,21 @@ struct PointOperator
     template <class Strain>
     PointOperator(const Lattice<2>& lattice, const Bin<2>& bin, const ShapeAt<Shape>& at, std::size_t lane, const Strain& strain)
     {
-        std::array<double, S> wx, wy, gx, gy;
-        for (std::size_t k = 0; k < S; ++k)
+        std::array<std::array<double, S>, 2> w, g;
+        for (std::size_t d = 0; d < 2; ++d)
         {
-            wx[k] = at.weights[0][k][lane];
-            wy[k] = at.weights[1][k][lane];
-            gx[k] = at.slopes[0][k][lane];
-            gy[k] = at.slopes[1][k][lane];
+            for (std::size_t k = 0; k < S; ++k)
+            {
+                w[d][k] = at.weights[d][k][lane];
+                g[d][k] = at.slopes[d][k][lane];
+            }
+            fold(w[d], bin.at[d], lattice.size[d]);
+            fold(g[d], bin.at[d], lattice.size[d]);
         }
-        fold(wx, bin.at[0], lattice.size[0]);
-        fold(gx, bin.at[0], lattice.size[0]);
-        fold(wy, bin.at[1], lattice.size[1]);
-        fold(gy, bin.at[1], lattice.size[1]);
         for (std::size_t k = 0; k < n; ++k)
         {
-            value[k] = wx[k % S] * wy[k / S];
-            const double x = gx[k % S] * wy[k / S], y = wx[k % S] * gy[k / S];
+            value[k] = w[0][k % S] * w[1][k / S];
+            const double x = g[0][k % S] * w[1][k / S], y = w[0][k % S] * g[1][k / S];
             xx[2 * k] = x;
             yy[2 * k + 1] = y;
             shear[2 * k] = y;
@@ -175,13 +174,11 @@ private:
 inline constexpr double crossing_share = 0.6;
 
 /// Limits of the present state.
-/// - stiffness: for musl and usf the isolated cell of LPFDM, since H M^-1 K with FLIP is at most M^-1 K / 2: below the sharp limit by a
-/// factor
-///   of 1.5 to 2.5 where cells hold 2 x 2 points or more, wherever these lie; with one point to a cell and linear shapes the sum over
-///   points that sit on nodes asks for a factor of 1/sqrt(2). PIC's share asks for sqrt((1 + f) / 2).
-/// - crossing, for linear shapes: stress jumps to other nodes where a point crosses a line of nodes, and steps near the limit of stiffness
-/// pump
-///   energy with that. XPIC takes it out.
+/// - stiffness: for musl and usf the isolated cell of LPFDM, since H M^-1 K with FLIP is at most M^-1 K / 2: below the sharp limit by
+///   a factor of 1.5 to 2.5 where cells hold 2 x 2 points or more, wherever these lie; with one point to a cell and linear shapes the sum
+///   over points that sit on nodes asks for a factor of 1/sqrt(2). PIC's share asks for sqrt((1 + f) / 2).
+/// - crossing, for linear shapes: stress jumps to other nodes where a point crosses a line of nodes, and steps near the limit of
+///   stiffness pump energy with that. XPIC takes it out.
 /// - cell content, for usl: see content_limit().
 /// - motion: a point crosses at most one cell in a step.
 template <class Shape>

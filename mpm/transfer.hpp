@@ -283,7 +283,7 @@ struct NodalVelocity
     template <class Strain, class At, class InBin>
     TESTBED_INLINE Gradient<dim, Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
     {
-        Gradient<dim, Pack> g = zero_gradient<dim>();
+        Gradient<dim, Pack> g;
         [[maybe_unused]] Pack dilatation(0.0);
         unrolled<blocks>(
             [&](auto k) TESTBED_INLINE

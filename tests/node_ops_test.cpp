@@ -28,7 +28,7 @@ TEST(Gravity, RampsSmoothly)
     EXPECT_DOUBLE_EQ(gravity.factor(2), 1);
     EXPECT_DOUBLE_EQ((Gravity{{0, -9.81}, 0}.factor(0)), 1);  // at once
     Nodes<2> nodes = two_nodes();
-    gravity.apply(nodes, 5);
+    gravity.apply(nodes, nodes.mass, 5);
     EXPECT_DOUBLE_EQ(nodes.f[1][0], -2 * 9.81);
     EXPECT_DOUBLE_EQ(nodes.f[1][1], 0);  // not in use
 }
@@ -48,7 +48,7 @@ TEST(Gravity, RampsLinearlyWhereTheSceneSaysSo)
 TEST(Gravity, PullsBothWays)
 {
     Nodes<2> nodes = two_nodes();
-    (Gravity{{2, -3}, 0}).apply(nodes, 1);
+    (Gravity{{2, -3}, 0}).apply(nodes, nodes.mass, 1);
     EXPECT_DOUBLE_EQ(nodes.f[0][2], 12 + 4 * 2);
     EXPECT_DOUBLE_EQ(nodes.f[1][2], -4 * 3);
 }

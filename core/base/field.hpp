@@ -5,6 +5,7 @@
 #include "core/base/simd.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -96,4 +97,38 @@ private:
     Output output_;
     std::vector<T> data_;
 };
+
+/// A list of numbers for each component of a vector or tensor, at points, cells or nodes.
+template <class List>
+concept ComponentList = requires(List list)
+{
+    list.data();
+};
+
+template <ComponentList List, std::size_t n, class Lanes>
+TESTBED_INLINE inline std::array<Pack, n> load(const std::array<List, n>& lists, std::size_t i, const Lanes& lanes)
+{
+    std::array<Pack, n> v;
+    unrolled<n>([&](auto d) TESTBED_INLINE { v[d] = lanes.load(&lists[d][i]); });
+    return v;
+}
+template <ComponentList List, std::size_t n, class Lanes>
+TESTBED_INLINE inline void store(std::array<List, n>& lists, std::size_t i, const Lanes& lanes, const std::array<Pack, n>& v)
+{
+    unrolled<n>([&](auto d) TESTBED_INLINE { lanes.store(&lists[d][i], v[d]); });
+}
+template <ComponentList List, std::size_t n>
+std::array<double, n> at(const std::array<List, n>& lists, std::size_t i)
+{
+    std::array<double, n> v;
+    for (std::size_t d = 0; d < n; ++d)
+        v[d] = lists[d][i];
+    return v;
+}
+template <ComponentList List, std::size_t n>
+void set(std::array<List, n>& lists, std::size_t i, const std::array<double, n>& v)
+{
+    for (std::size_t d = 0; d < n; ++d)
+        lists[d][i] = v[d];
+}
 }  // namespace testbed

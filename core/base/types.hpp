@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <type_traits>
 
 namespace testbed
 {
@@ -31,11 +32,16 @@ template <class T>
 struct SymTensor<2, T>
 {
     T xx{}, yy{}, xy{};
+
+    /// Number of component (i, j).
+    static constexpr int number(int i, int j) { return i == j ? i : 2; }
 };
 template <class T>
 struct SymTensor<3, T>
 {
     T xx{}, yy{}, zz{}, yz{}, zx{}, xy{};
+
+    static constexpr int number(int i, int j) { return i == j ? i : 6 - i - j; }
 };
 
 /// Gradient of the displacement increment over one step: xy means d(u_x)/dy, yx means d(u_y)/dx [-].
@@ -47,6 +53,8 @@ struct Gradient<2, T>
 {
     T xx{}, yy{}, xy{}, yx{};
 
+    /// Number of component (i, j), d(u_i)/d(x_j).
+    static constexpr int number(int i, int j) { return i == j ? i : 2 + i; }
     T trace() const { return xx + yy; }
     T shear() const { return xy + yx; }                ///< engineering shear, eq. (5e)
     T rotation() const { return T(0.5) * (yx - xy); }  ///< anticlockwise, eq. (5f)
@@ -56,6 +64,7 @@ struct Gradient<3, T>
 {
     T xx{}, yy{}, zz{}, xy{}, yz{}, zx{}, yx{}, zy{}, xz{};
 
+    static constexpr int number(int i, int j) { return i == j ? i : j == (i + 1) % 3 ? 3 + i : 6 + j; }
     T trace() const { return xx + yy + zz; }
 };
 
@@ -78,68 +87,44 @@ TESTBED_INLINE inline auto members(auto& t)
 template <int dim>
 inline constexpr int symmetric_components = dim*(dim + 1) / 2;
 
-/// Number of component (i, j) of a SymTensor: the diagonal comes first, then the planes across x, y, z.
-template <int dim>
-constexpr int symmetric_component(int i, int j)
-{
-    return i == j ? i : dim == 2 ? 2 : 6 - i - j;
-}
-/// Number of component (i, j) of a Gradient, d(u_i)/d(x_j): the diagonal, then j after i, then the others.
-template <int dim>
-constexpr int gradient_component(int i, int j)
-{
-    return i == j ? i : dim == 2 ? 2 + i : j == (i + 1) % 3 ? 3 + i : 6 + j;
-}
-
 /// Component k, in the order of their names.
 template <int k>
 TESTBED_INLINE inline auto& component(auto& t)
 {
     return std::get<k>(detail::members(t));
 }
-template <int i, int j, int dim, class T>
-TESTBED_INLINE inline T& component(SymTensor<dim, T>& s)
+template <int i, int j>
+TESTBED_INLINE inline auto& component(auto& t)
 {
-    return component<symmetric_component<dim>(i, j)>(s);
-}
-template <int i, int j, int dim, class T>
-TESTBED_INLINE inline const T& component(const SymTensor<dim, T>& s)
-{
-    return component<symmetric_component<dim>(i, j)>(s);
-}
-template <int i, int j, int dim, class T>
-TESTBED_INLINE inline T& component(Gradient<dim, T>& g)
-{
-    return component<gradient_component<dim>(i, j)>(g);
-}
-template <int i, int j, int dim, class T>
-TESTBED_INLINE inline const T& component(const Gradient<dim, T>& g)
-{
-    return component<gradient_component<dim>(i, j)>(g);
+    return component<std::remove_cvref_t<decltype(t)>::number(i, j)>(t);
 }
 
-/// Component by component, as set_zero().
-template <int dim>
-TESTBED_INLINE inline Gradient<dim, Pack> zero_gradient()
+/// The tensor with these components, in the order of their names.
+template <class Tensor, class T, std::size_t n>
+TESTBED_INLINE inline Tensor tensor_of(const std::array<T, n>& components)
 {
-    Gradient<dim, Pack> g;
-    unrolled<dim * dim>([&](auto k) TESTBED_INLINE { component<k>(g) = Pack(0.0); });
-    return g;
+    Tensor t;
+    unrolled<n>([&](auto k) TESTBED_INLINE { component<k>(t) = components[k]; });
+    return t;
 }
 
+/// f(component of a, component of b) for each component.
+template <int dim, class T, class F>
+TESTBED_INLINE inline Gradient<dim, T> by_component(const Gradient<dim, T>& a, const Gradient<dim, T>& b, F&& f)
+{
+    Gradient<dim, T> c;
+    unrolled<dim * dim>([&](auto k) TESTBED_INLINE { component<k>(c) = f(component<k>(a), component<k>(b)); });
+    return c;
+}
 template <int dim, class T>
 TESTBED_INLINE inline Gradient<dim, T> operator+(const Gradient<dim, T>& a, const Gradient<dim, T>& b)
 {
-    Gradient<dim, T> c;
-    unrolled<dim * dim>([&](auto k) TESTBED_INLINE { component<k>(c) = component<k>(a) + component<k>(b); });
-    return c;
+    return by_component(a, b, [](const T& x, const T& y) TESTBED_INLINE { return x + y; });
 }
 template <int dim, class T>
 TESTBED_INLINE inline Gradient<dim, T> operator-(const Gradient<dim, T>& a, const Gradient<dim, T>& b)
 {
-    Gradient<dim, T> c;
-    unrolled<dim * dim>([&](auto k) TESTBED_INLINE { component<k>(c) = component<k>(a) - component<k>(b); });
-    return c;
+    return by_component(a, b, [](const T& x, const T& y) TESTBED_INLINE { return x - y; });
 }
 template <int dim, class T>
 TESTBED_INLINE inline Gradient<dim, T>& operator+=(Gradient<dim, T>& a, const Gradient<dim, T>& b)

@@ -44,8 +44,7 @@ void Bins<dim>::make_slots()
 template <int dim>
 bool Bins<dim>::insert_new()
 {
-    std::vector<std::uint32_t>& cells = new_cells_;
-    cells.clear();
+    std::vector<std::uint32_t> cells;
     for_each_marked(
         [&](std::uint32_t, std::uint32_t p)
         {
@@ -58,12 +57,8 @@ bool Bins<dim>::insert_new()
     if (cells.empty())
         return false;
     std::sort(cells.begin(), cells.end());
-    std::vector<Bin<dim>>& old = old_bins_;
-    std::vector<char>& old_marked = old_marked_;
-    old.swap(bins_);
-    old_marked.swap(marked_);
-    bins_.clear();
-    marked_.clear();
+    const std::vector<Bin<dim>> old = std::exchange(bins_, {});
+    const std::vector<char> old_marked = std::exchange(marked_, {});
     before_.clear();
     const auto add = [&](const Bin<dim>& bin, char is_marked, std::uint32_t number)
     {

@@ -101,9 +101,8 @@ public:
     std::size_t bytes() const
     {
         return slot_.capacity() * sizeof(slot_[0]) + bins_.capacity() * sizeof(Bin<dim>) + moves_.capacity() * sizeof(Move) +
-               marked_.capacity() + old_marked_.capacity() + old_bins_.capacity() * sizeof(Bin<dim>) +
-               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity() + new_cells_.capacity()) *
-                   sizeof(std::uint32_t);
+               marked_.capacity() +
+               (key_.capacity() + before_.capacity() + marks_.capacity() + changed_.capacity() + next_.capacity()) * sizeof(std::uint32_t);
     }
 
 private:
@@ -204,9 +203,6 @@ private:
     std::vector<std::uint32_t> changed_;
     std::vector<std::uint32_t> next_;  ///< where the next point of each bin goes
     std::vector<Move> moves_;
-    std::vector<std::uint32_t> new_cells_;
-    std::vector<Bin<dim>> old_bins_;  ///< room for the lists before new bins came
-    std::vector<char> old_marked_;
     std::size_t size_before_ = 0;
 };
 

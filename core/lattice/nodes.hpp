@@ -1,7 +1,7 @@
 #pragma once
 /// What lives on the lattice: vectors by cell or node, and the unknowns of nodes.
 
-#include "core/base/parallel.hpp"
+#include "core/base/field.hpp"
 #include "core/lattice/lattice.hpp"
 
 namespace testbed
@@ -36,33 +36,6 @@ void for_each_run(const std::vector<Run>& runs, F&& f)
 /// A number in each direction for each cell or node.
 template <std::size_t dim>
 using VectorField = std::array<std::vector<double>, dim>;
-
-template <std::size_t n, class Lanes>
-TESTBED_INLINE inline std::array<Pack, n> load(const VectorField<n>& values, std::size_t i, const Lanes& lanes)
-{
-    std::array<Pack, n> v;
-    unrolled<n>([&](auto d) TESTBED_INLINE { v[d] = lanes.load(&values[d][i]); });
-    return v;
-}
-template <std::size_t n, class Lanes>
-TESTBED_INLINE inline void store(VectorField<n>& values, std::size_t i, const Lanes& lanes, const std::array<Pack, n>& v)
-{
-    unrolled<n>([&](auto d) TESTBED_INLINE { lanes.store(&values[d][i], v[d]); });
-}
-template <std::size_t n>
-std::array<double, n> at(const VectorField<n>& values, std::size_t i)
-{
-    std::array<double, n> v;
-    for (std::size_t d = 0; d < n; ++d)
-        v[d] = values[d][i];
-    return v;
-}
-template <std::size_t n>
-void set(VectorField<n>& values, std::size_t i, const std::array<double, n>& v)
-{
-    for (std::size_t d = 0; d < n; ++d)
-        values[d][i] = v[d];
-}
 
 /// Nodal unknowns, and which nodes are in use at present.
 template <int dim>

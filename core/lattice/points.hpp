@@ -88,18 +88,11 @@ struct Points
         return v;
     }
     bool has_box() const { return half_width[0].active(); }
-    SymTensor<dim> stress_at(std::size_t p) const
-    {
-        SymTensor<dim> s;
-        unrolled<symmetric_components<dim>>([&](auto k) { component<k>(s) = stress[k][p]; });
-        return s;
-    }
+    SymTensor<dim> stress_at(std::size_t p) const { return tensor_of<SymTensor<dim>>(at(stress, p)); }
     template <class Lanes>
     TESTBED_INLINE SymTensor<dim, Pack> stress_at(std::size_t p, const Lanes& lanes) const
     {
-        SymTensor<dim, Pack> s;
-        unrolled<symmetric_components<dim>>([&](auto k) TESTBED_INLINE { component<k>(s) = lanes.load(&stress[k][p]); });
-        return s;
+        return tensor_of<SymTensor<dim, Pack>>(load(stress, p, lanes));
     }
     template <class Lanes>
     TESTBED_INLINE void set_stress(std::size_t p, const Lanes& lanes, const SymTensor<dim, Pack>& s)
@@ -126,33 +119,4 @@ private:
         rest(self.stiffness, self.szz, self.plastic_shear, self.softening_strain, self.cohesion, self.sin_friction, self.id);
     }
 };
-
-/// A vector at the points [p, p + lanes).
-template <std::size_t dim, class Lanes>
-TESTBED_INLINE inline std::array<Pack, dim> load(const std::array<Field<double>, dim>& vector, std::size_t p, const Lanes& lanes)
-{
-    std::array<Pack, dim> v;
-    unrolled<dim>([&](auto d) TESTBED_INLINE { v[d] = lanes.load(&vector[d][p]); });
-    return v;
-}
-template <std::size_t dim, class Lanes>
-TESTBED_INLINE inline void store(std::array<Field<double>, dim>& vector, std::size_t p, const Lanes& lanes, const std::array<Pack, dim>& v)
-{
-    unrolled<dim>([&](auto d) TESTBED_INLINE { lanes.store(&vector[d][p], v[d]); });
-}
-/// That of point p.
-template <std::size_t dim>
-std::array<double, dim> at(const std::array<Field<double>, dim>& vector, std::size_t p)
-{
-    std::array<double, dim> v;
-    for (std::size_t d = 0; d < dim; ++d)
-        v[d] = vector[d][p];
-    return v;
-}
-template <std::size_t dim>
-void set(std::array<Field<double>, dim>& vector, std::size_t p, const std::array<double, dim>& v)
-{
-    for (std::size_t d = 0; d < dim; ++d)
-        vector[d][p] = v[d];
-}
 }  // namespace testbed

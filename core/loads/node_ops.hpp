@@ -30,7 +30,6 @@ struct Gravity
 
     Vec<2> now(double t) const { return {factor(t) * acceleration[0], factor(t) * acceleration[1]}; }
 
-    void apply(Nodes<2>& nodes, double t) const { apply(nodes, nodes.mass, t); }
     /// @param mass of the nodes, that has weight
     void apply(Nodes<2>& nodes, const std::vector<double>& mass, double t) const
     {
@@ -223,24 +222,12 @@ private:
 
 inline double force_norm(const Nodes<2>& nodes)
 {
-    const auto& runs = nodes.runs();
-    const auto s = ordered_sum<1>(
-        runs.size(),
-        [&](std::size_t r)
-        {
-            Pack square(0.0);
-            for_each_pack(runs[r].begin, runs[r].begin + runs[r].count,
-                          [&](std::size_t i, const auto& lanes)
-                          {
-                              auto f = load(nodes.f, i, lanes);
-                              for (Pack& component : f)
-                                  component = lanes.keep(component);
-                              square += total<f.size()>([&](auto d) { return f[d] * f[d]; });
-                          });
-            return std::array<double, 1>{sum(square)};
-        },
-        4);
-    return std::sqrt(s[0]);
+    const auto square = [&](std::size_t i, const auto& lanes)
+    {
+        const auto f = load(nodes.f, i, lanes);
+        return std::array{total<2>([&](auto d) { return f[d] * f[d]; })};
+    };
+    return std::sqrt(sum_over_nodes<1>(nodes, square)[0]);
 }
 
 inline std::size_t nodes_with_mass(const Nodes<2>& nodes)

@@ -56,7 +56,7 @@ struct MohrCoulomb : ElasticPart
     {
         elastic(state, d);
         if (!inside(state, strength, state.plastic_shear_strain))
-            plastic(state, strength, LocalDriver{});
+            plastic(state);
     }
 
     /// The same on the points [p, p + lanes).
@@ -70,21 +70,13 @@ protected:
     /// What drives softening: the plastic shear strain of the point, at the end of the step.
     struct LocalDriver
     {
-        template <class T>
-        TESTBED_INLINE static T at_end(T own, T)
-        {
-            return own;
-        }
+        TESTBED_INLINE static Pack at_end(Pack own, Pack) { return own; }
         static const Field<double>& field(const Points<2>& q) { return q.plastic_shear; }
     };
     /// A field that stays as it is within a step: the cohesion is known before the return.
     struct NonlocalDriver
     {
-        template <class T>
-        TESTBED_INLINE static T at_end(T, T given)
-        {
-            return given;
-        }
+        TESTBED_INLINE static Pack at_end(Pack, Pack given) { return given; }
         static const Field<double>& field(const Points<2>& q) { return q.softening_strain; }
     };
 
@@ -112,8 +104,7 @@ protected:
     }
 
     /// The return of one point whose trial stress is not admissible.
-    template <class Driver>
-    void plastic(State<double>& state, const Strength<>& point, Driver, double given = 0) const
+    void plastic(State<double>& state) const
     {
         SymTensor<2>& s = state.stress;
         const double mean = 0.5 * (s.xx + s.yy), half = 0.5 * (s.xx - s.yy), radius = std::hypot(half, s.xy);
@@ -132,11 +123,11 @@ protected:
         const auto excess = [&](double share)  // of the assumed cohesion over the one that the return leads to
         {
             returned = trial;
-            back(returned, point.sin_phi, share * point.cohesion);
+            back(returned, strength.sin_phi, share * strength.cohesion);
             increment = back.plastic_shear(trial, returned);
-            return share - softening.share(Driver::at_end(own + increment, given));
+            return share - softening.share(own + increment);
         };
-        softening.solve(excess, Driver::at_end(own, given));
+        softening.solve(excess, own);
 
         state.plastic_shear_strain = own + increment;
         state.stress_zz = returned[zz];

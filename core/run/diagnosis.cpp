@@ -52,7 +52,7 @@ double checkerboard_share(const Lattice<2>& lattice, const Nodes<2>& nodes)
     const std::size_t above = lattice.node_stride();
     for (const auto n : nodes.active())
     {
-        if (!lattice.has_node({lattice.node_index(n)[0] + 1, lattice.node_index(n)[1] + 1}))
+        if (!lattice.has_node(lattice.node_index(n) + testbed::all<2>(1)))
             continue;
         const std::array<std::size_t, 4> corner{n, n + 1, n + above, n + above + 1};
         const auto light = [&](std::size_t k) { return !(nodes.mass[k] > 0); };
