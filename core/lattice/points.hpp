@@ -28,15 +28,20 @@ struct Components;
 template <>
 struct Components<2>
 {
-    static constexpr std::array position{"x", "y"}, initial_position{"X", "Y"}, half_width{"half_width_x", "half_width_y"},
-        velocity{"velocity_x", "velocity_y"}, stress{"stress_xx", "stress_yy", "stress_xy"};
+    static constexpr std::array position{"x", "y"};
+    static constexpr std::array initial_position{"X", "Y"};
+    static constexpr std::array half_width{"half_width_x", "half_width_y"};
+    static constexpr std::array velocity{"velocity_x", "velocity_y"};
+    static constexpr std::array stress{"stress_xx", "stress_yy", "stress_xy"};
 };
 template <>
 struct Components<3>
 {
-    static constexpr std::array position{"x", "y", "z"}, initial_position{"X", "Y", "Z"},
-        half_width{"half_width_x", "half_width_y", "half_width_z"}, velocity{"velocity_x", "velocity_y", "velocity_z"},
-        stress{"stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy"};
+    static constexpr std::array position{"x", "y", "z"};
+    static constexpr std::array initial_position{"X", "Y", "Z"};
+    static constexpr std::array half_width{"half_width_x", "half_width_y", "half_width_z"};
+    static constexpr std::array velocity{"velocity_x", "velocity_y", "velocity_z"};
+    static constexpr std::array stress{"stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy"};
 };
 
 template <int dim>
