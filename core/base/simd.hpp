@@ -11,8 +11,8 @@
 #include <utility>
 
 /// What a kernel consists of is inlined into it whole: one call left makes the compiler spill every vector register around it. Not
-/// under the address sanitizer, with which that takes minutes to compile.
-#ifdef __SANITIZE_ADDRESS__
+/// under the sanitizers, with which that takes minutes to compile.
+#ifdef TESTBED_SANITIZE
 #define TESTBED_INLINE
 #define TESTBED_FLATTEN
 #else
