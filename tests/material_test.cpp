@@ -1,4 +1,5 @@
-#include "core/materials/make_material.hpp"
+#include "core/materials/material.hpp"
+#include "core/materials/material_spec.hpp"
 #include "tests/random.hpp"
 
 #include <gtest/gtest.h>
@@ -151,11 +152,11 @@ TEST(Batch, EqualsPointFunction)
 TEST(MakeMaterial, StrengthAndSofteningOfAScene)
 {
     MaterialSpec spec;
-    spec.law = MaterialSpec::Law::mohr_coulomb;
+    spec.law = Laws::place_of<MohrCoulomb>();
     spec.density = 1;
     spec.strength = StrengthSpec{.cohesion = "10", .friction_angle = "0.6", .dilatancy_angle = 0.3, .tensile_strength = 4.0};
     spec.softening = SofteningSpec{.kind = SofteningSpec::Kind::linear, .residual = 0.4, .strain = 0.2, .band_thickness = 0.1};
-    const auto law = std::get<MohrCoulomb>(make_material(spec, {1e6, 0.3}, {10, std::sin(0.6)}, 0.5, {}));
+    const auto law = std::get<MohrCoulomb>(Laws::make(spec.law, spec, {{1e6, 0.3}, {10, std::sin(0.6)}, 0.5, {}}));
     EXPECT_DOUBLE_EQ(law.back.sin_psi(), std::sin(0.3));
     EXPECT_EQ(law.back.tensile_strength(), 4);
     // cells five times as wide as the band: the displacement of the band is spread over them

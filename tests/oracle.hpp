@@ -24,7 +24,7 @@ inline std::vector<RefPoint> reference_points(const Scene& scene)
         {
             const Place at{X[0], X[1], X[0], X[1], 0};
             points.push_back({X[0], X[1], m.density * h * h, h * h, h / 2, h / 2, v(at)[0], v(at)[1], E(at), m.poissons_ratio,
-                              m.law == MaterialSpec::Law::hypoelastic_jaumann ? 1 : 2});
+                              m.law == Laws::place_of<HypoelasticJaumann>() ? 1 : 2});
         }
     }
     return points;

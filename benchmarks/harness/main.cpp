@@ -146,7 +146,7 @@ void list()
         for (const Variant& v : method.variants)
             fmt::print("  {:<16} {}\n", v.name, v.description);
     fmt::print("laws (for `law` of a material)\n");
-    for (const std::string& law : names_of<MaterialSpec::Law>())
+    for (const std::string& law : names_of<Law>())
         fmt::print("  {}\n", law);
 }
 

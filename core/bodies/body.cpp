@@ -2,7 +2,6 @@
 
 #include "core/bodies/density_scaling.hpp"
 #include "core/bodies/random_field.hpp"
-#include "core/materials/make_material.hpp"
 #include "core/scene/geometry.hpp"
 
 #include <algorithm>
@@ -100,7 +99,7 @@ MaterialSpec needed_material(const Scene& scene, const BodySpec& spec, PointNeed
 {
     MaterialSpec material = scene.material(spec.material);
     if (material.has_strength() && !needs.strength)
-        material.law = MaterialSpec::Law::linear_elastic;
+        material.law = Laws::place_of<LinearElastic>();
     return material;
 }
 
@@ -114,7 +113,8 @@ Body empty_body(const Scene& scene, const BodySpec& spec, const MaterialSpec& ma
                                     : Strength<>{0, 0};
     return {spec.name,
             {},
-            make_material(material, {parameters.largest_stiffness(), material.poissons_ratio}, strength, scene.grid.cell_size, varying),
+            Laws::make(material.law, material,
+                       {{parameters.largest_stiffness(), material.poissons_ratio}, strength, scene.grid.cell_size, varying}),
             Bins(lattice),
             scene.confinement ? scene.confinement->pressure : 0.0,
             parameters.truncated_share};

@@ -6,34 +6,14 @@
 #include "core/base/types.hpp"
 #include "core/lattice/points.hpp"
 #include "core/materials/kinematics.hpp"
+#include "core/materials/law_input.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <variant>
 
 namespace testbed
 {
-class ElasticModuli
-{
-public:
-    ElasticModuli() = default;
-    /// @param youngs_modulus [Pa] @param poissons_ratio in (-1, 1/2)
-    ElasticModuli(double youngs_modulus, double poissons_ratio)
-        : youngs_modulus_(youngs_modulus),
-          poissons_ratio_(poissons_ratio),
-          shear_(youngs_modulus / (2 * (1 + poissons_ratio))),
-          lame_(2 * shear_ * poissons_ratio / (1 - 2 * poissons_ratio))
-    {
-    }
-    double youngs_modulus() const { return youngs_modulus_; }
-    double poissons_ratio() const { return poissons_ratio_; }
-    double shear() const { return shear_; }                    ///< G, mu
-    double lame() const { return lame_; }                      ///< lambda
-    double constrained() const { return lame_ + 2 * shear_; }  ///< M
-
-private:
-    double youngs_modulus_ = 0, poissons_ratio_ = 0, shear_ = 0, lame_ = 0;
-};
-
 /// Largest ratio of eps : D : eps over |grad u|^2, by which no cell is stiffer: 2 (lambda + mu) of in-plane dilatation, or 2 mu of shear
 /// where Poisson's ratio is negative [Pa].
 inline double gradient_stiffness(const ElasticModuli& m)
@@ -69,6 +49,7 @@ struct ElasticPart
 
 struct NoRotation
 {
+    static constexpr const char* law = "linear_elastic";
     template <class T>
     TESTBED_INLINE static void rotate(SymTensor<2, T>&, T)
     {
@@ -78,6 +59,7 @@ struct NoRotation
 /// Increment of the Jaumann rate, W s - s W with the spin increment `angle` (anticlockwise).
 struct JaumannRotation
 {
+    static constexpr const char* law = "hypoelastic_jaumann";
     template <class T>
     TESTBED_INLINE static void rotate(SymTensor<2, T>& s, T angle)
     {
@@ -91,6 +73,7 @@ struct JaumannRotation
 /// R s R^T with R orthogonal to rounding and its angle right to angle^7.
 struct ExactRotation
 {
+    static constexpr const char* law = "hypoelastic_exact_rotation";
     template <class T>
     TESTBED_INLINE static void rotate(SymTensor<2, T>& s, T angle)
     {
@@ -107,9 +90,18 @@ struct ExactRotation
     }
 };
 
+template <class Law>
+struct VaryingStiffness;
+
 template <class Rotation>
 struct Hypoelastic : ElasticPart
 {
+    static constexpr const char* name = Rotation::law;
+    static constexpr bool has_strength = false;
+    using Keys = NoKeys;
+    using Forms = std::variant<Hypoelastic, VaryingStiffness<Hypoelastic>>;
+    static Forms make(const Keys&, const LawInput& input);
+
     template <class T>
     struct State
     {
@@ -176,6 +168,15 @@ struct VaryingStiffness : Law
         Law::store(q, p, lanes, state);
     }
 };
+
+template <class Rotation>
+typename Hypoelastic<Rotation>::Forms Hypoelastic<Rotation>::make(const Keys&, const LawInput& input)
+{
+    const Hypoelastic law{{input.moduli}};
+    if (input.varying.stiffness)
+        return VaryingStiffness<Hypoelastic>{law};
+    return law;
+}
 
 using LinearElastic = Hypoelastic<NoRotation>;
 using HypoelasticJaumann = Hypoelastic<JaumannRotation>;

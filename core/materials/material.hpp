@@ -1,46 +1,13 @@
 #pragma once
-/// The closed set of laws. A body holds one of them; a kernel visits it once per launch.
+/// A body's law, one of the closed set. A kernel visits it once per launch.
 
-#include "core/materials/mohr_coulomb.hpp"
+#include "core/materials/laws.hpp"
 
-#include <concepts>
 #include <variant>
 
 namespace testbed
 {
-using Material = std::variant<LinearElastic, HypoelasticJaumann, HypoelasticExactRotation, VaryingStiffness<LinearElastic>,
-                              VaryingStiffness<HypoelasticJaumann>, VaryingStiffness<HypoelasticExactRotation>, MohrCoulomb,
-                              MohrCoulombField<true, false>, MohrCoulombField<false, true>, MohrCoulombField<true, true>>;
-
-/// What a law must offer: a pure point function (which a quadrature point or a triangle can call, too), its batch form, and what only
-/// the law knows of itself: energy, wave speed, out-of-plane stress, kinematics.
-template <class Law>
-concept MaterialLaw = requires(const Law law, typename Law::template State<double> state, Points<2> points, Gradient<2> d,
-                               Gradient<2, Pack> packs)
-{
-    {
-        law.moduli
-        } -> std::convertible_to<ElasticModuli>;
-    {
-        Law::kinematics
-        } -> std::convertible_to<Kinematics>;
-    {
-        law.wave_speed(points)
-        } -> std::same_as<double>;
-    {
-        law.energy_density(SymTensor<2>{}, 0.0)
-        } -> std::same_as<double>;
-    {
-        law.out_of_plane_stress(points, std::size_t{})
-        } -> std::same_as<double>;
-    {
-        law.elastic_out_of_plane_stress(SymTensor<2>{})
-        } -> std::same_as<double>;
-    law.allocate(points);
-    law.update(state, d);
-    law.update(points, std::size_t{}, AllLanes{}, packs);
-};
-static_assert(MaterialLaw<LinearElastic> && MaterialLaw<VaryingStiffness<HypoelasticJaumann>> && MaterialLaw<MohrCoulombField<true, true>>);
+using Material = Laws::Material;
 
 inline const ElasticModuli& moduli(const Material& material)
 {

@@ -9,20 +9,23 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <variant>
 
 namespace testbed
 {
-/// Strength of one point. T is double or a pack.
-template <class T = double>
-struct Strength
-{
-    T cohesion;  ///< before softening [Pa]
-    T sin_phi;
-};
+template <bool varying_strength, bool nonlocal>
+struct MohrCoulombField;
 
 /// The law with one strength for all points of the body, and softening by the point's own plastic shear strain.
 struct MohrCoulomb : ElasticPart
 {
+    static constexpr const char* name = "mohr_coulomb";
+    static constexpr bool has_strength = true;
+    using Keys = StrengthKeys;
+    using Forms = std::variant<MohrCoulomb, MohrCoulombField<true, false>, MohrCoulombField<false, true>, MohrCoulombField<true, true>>;
+    /// @param keys has a strength
+    static Forms make(const Keys& keys, const LawInput& input);
+
     Strength<> strength{0, 0};
     MohrCoulombReturn back;
     Softening softening;
@@ -250,4 +253,21 @@ struct MohrCoulombField : MohrCoulomb
         MohrCoulomb::update(q, p, lanes, d, point, std::conditional_t<nonlocal, NonlocalDriver, LocalDriver>{});
     }
 };
+
+inline MohrCoulomb::Forms MohrCoulomb::make(const Keys& keys, const LawInput& input)
+{
+    const double tension = keys.strength->tensile_strength.value_or(std::numeric_limits<double>::infinity());
+    const MohrCoulomb law{{input.moduli},
+                          input.strength,
+                          {input.moduli, std::sin(keys.strength->dilatancy_angle), tension},
+                          keys.softening ? Softening::of(*keys.softening, input.cell_size) : Softening{}};
+    const bool nonlocal = keys.softening && keys.softening->nonlocal;
+    if (input.varying.strength && nonlocal)
+        return MohrCoulombField<true, true>{law};
+    if (input.varying.strength)
+        return MohrCoulombField<true, false>{law};
+    if (nonlocal)
+        return MohrCoulombField<false, true>{law};
+    return law;
+}
 }  // namespace testbed

@@ -3,6 +3,7 @@
 /// an infinite slope, no softening a slope of zero.
 
 #include "core/base/simd.hpp"
+#include "core/materials/strength_spec.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +17,14 @@ public:
     static Softening drop(double residual) { return {residual, 1e300}; }
     /// @param strain plastic shear strain at which the residual is reached; crack-band scaling divides it by L / t_sb
     static Softening linear(double residual, double strain) { return {residual, (1 - residual) / strain}; }
+    /// @param cell_size L [m]
+    static Softening of(const SofteningSpec& spec, double cell_size)
+    {
+        if (spec.kind == SofteningSpec::Kind::drop)
+            return drop(spec.residual);
+        const double scaling = spec.band_thickness ? cell_size / *spec.band_thickness : 1;
+        return linear(spec.residual, *spec.strain / scaling);
+    }
 
     /// NaN of NaN.
     template <class T>

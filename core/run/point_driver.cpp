@@ -1,6 +1,6 @@
 #include "core/run/point_driver.hpp"
 
-#include "core/materials/make_material.hpp"
+#include "core/materials/material.hpp"
 #include "core/scene/geometry.hpp"
 #include "core/scene/reader.hpp"
 
@@ -183,6 +183,7 @@ std::string drive_point(const PointPathSpec& spec, const std::string& path)
     const Strength<> strength =
         m.strength ? Strength<>{evaluate_constant(m.strength->cohesion, {}), std::sin(evaluate_constant(m.strength->friction_angle, {}))}
                    : Strength<>{0, 0};
-    return std::visit([&](const auto& law) { return drive(law, spec, path); }, make_material(m, moduli, strength, spec.cell_size, {}));
+    return std::visit([&](const auto& law) { return drive(law, spec, path); },
+                      Laws::make(m.law, m, {moduli, strength, spec.cell_size, {}}));
 }
 }  // namespace testbed

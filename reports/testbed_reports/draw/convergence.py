@@ -8,6 +8,8 @@ from matplotlib.lines import Line2D
 from ..grade import metrics
 from ..grade.convergence import fit_order
 from ..grade.targets import number
+from ..read.figure_tables import figure_kind
+from ..read.study_reader import LIST, NUMBER, TEXT
 from .drawing import Drawing, FigureError, by_series, chosen, exact_of, log_y, lower_edge, name_of, rails, sizes_axis
 from .style import WIDTH, frame, legend_below, legend_shape
 
@@ -133,6 +135,7 @@ def _notes(series, exact, fits, high, x):
     return list(dict.fromkeys(notes))
 
 
+@figure_kind("convergence", {"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "orders": LIST, "L_from": NUMBER, "L_to": NUMBER})
 def convergence(study, entry, style):
     """The mean of each series against x in log axes, orders of errors in the legend."""
     quantity, norm, x = entry["quantity"], entry.get("norm", ""), entry.get("x", "L")

@@ -6,6 +6,8 @@ from matplotlib.lines import Line2D
 
 from ..grade import components, metrics
 from ..grade.targets import number
+from ..read.figure_tables import figure_kind
+from ..read.study_reader import FLAG, LIST, NUMBER, TEXT
 from .drawing import HISTORY_NAMES, Drawing, FigureError, axis_scale, by_series, chosen, one_size, short, with_result, with_unit
 from .style import EXACT, WIDTH, frame, legend_below, legend_shape
 
@@ -105,6 +107,13 @@ def _range(values, factor, more=()):
     return finite.min() - pad, finite.max() + pad
 
 
+def _check_recorder(reader, entry, index):
+    if "support" in entry and "probe" in entry:
+        reader.fail(f"[[figure]] number {index + 1} takes its quantity from a support or a probe, not both", "probe", "figure", index)
+
+
+@figure_kind("history", {"quantity": TEXT}, {"probe": TEXT, "support": TEXT, "L": NUMBER + LIST, "scale_x": TEXT + NUMBER,
+                                             "scale_y": TEXT + NUMBER, "log": FLAG, "t_max": NUMBER}, _check_recorder)
 def history(study, entry, style):
     notes, exact = [], []
     of = {"support": entry.get("support"), "probe": entry.get("probe")}
@@ -170,6 +179,17 @@ def _axis_of_curve(entry, side, values):
     return with_unit(entry.get(f"{side}_label", title), unit), factor
 
 
+def _check_recorders(reader, entry, index):
+    for side in ("x", "y"):
+        if f"{side}_support" in entry and f"{side}_probe" in entry:
+            reader.fail(f"[[figure]] number {index + 1} takes '{side}' from a support or a probe, not both", f"{side}_probe",
+                        "figure", index)
+
+
+@figure_kind("curve", {"x": TEXT, "y": TEXT},
+             {f"{key}_{side}": TEXT + NUMBER for side in "xy" for key in ("offset", "scale")}
+             | {f"{side}_{key}": TEXT for side in "xy" for key in ("support", "probe", "label", "unit")}
+             | {"L": NUMBER + LIST, "levels": LIST}, _check_recorders)
 def curve(study, entry, style):
     """y against x, both histories less an offset and over a scale; horizontal lines at reference levels."""
     notes = []

@@ -1,81 +1,16 @@
-"""The figures that a study declares. Each function takes (study, entry, style) and returns a Drawing.
+"""The figures that a study declares, of the kinds that the modules beside this one draw.
 
 What a run did not give is shown (top rail) or told in the notes, never dropped in silence.
 """
-import math
-
-import numpy as np
-
-from ..grade.targets import number
+from ..read.figure_tables import FIGURE_KINDS
 from ..read.results import ResultError
-from .convergence import convergence
-from .curves import curve, history
-from .drawing import Drawing, FigureError, by_series, chosen, name_of, one_size
-from .maps import field_maps
-from .matrix import stability_matrix
-from .power_law import power_law
-from .profile import profile
-from .style import RAIL, WIDTH, frame
-from .work_precision import work_precision
-
-
-def bars(study, entry, style):
-    quantity, norm = entry["quantity"], entry.get("norm", "")
-    runs, notes = one_size(chosen(study, entry), entry), []
-    groups = by_series(runs, entry, style)
-    rows = {}
-    for label, own in groups.items():
-        good = [v for v in (run.value(quantity, norm) for run in own) if math.isfinite(v)]
-        rows[label] = np.percentile(good, [50, 0, 100]) if good else None
-    if all(v is None for v in rows.values()):
-        raise FigureError(f"no completed run has {quantity} {norm}".rstrip())
-    title, largest = name_of(quantity, norm), max(abs(v[2]) for v in rows.values() if v is not None)
-    if largest >= 1e4 and not entry.get("log"):  # the power of ten goes into the unit
-        power = 3 * int(math.log10(largest) // 3)
-        rows = {label: None if v is None else v / 10.0**power for label, v in rows.items()}
-        title = title.replace("[1/", "[").replace("[", rf"[$10^{{{power}}}$" + ("/" if "[1/" in title else " ")) \
-            if "[" in title else rf"{title} [$10^{{{power}}}$]"
-    width = WIDTH[entry.get("width", "column")]
-    longest = max(len(label) for label in rows)
-    figure, axes = frame(width, 0.24 * len(rows) + 0.15, left=0.15 + 0.073 * longest, right=0.55)
-    axis = axes[0, 0]
-    for k, (label, value) in enumerate(rows.items()):
-        if value is None:
-            statuses = ", ".join(dict.fromkeys(run.status for run in groups[label]))
-            axis.annotate(f"× {statuses}", (0, k), xycoords=("axes fraction", "data"), xytext=(3, 0),
-                          textcoords="offset points", va="center", fontsize=7, color=RAIL)
-            continue
-        if entry.get("log"):  # a bar has no foot on a log axis: a dot on a rule
-            axis.axhline(k, color="0.88", linewidth=0.6, zorder=0)
-            axis.plot(value[0], k, **style.of(label) | {"linestyle": "none", "markersize": 5.5})
-        else:
-            axis.barh(k, value[0], height=0.62, color=style.colour(label), alpha=0.85, edgecolor="white", linewidth=0,
-                      hatch=("", "///", "...", "xxx", "\\\\\\")[style.slot(label) % 5])
-        if value[2] > value[1]:
-            axis.plot(value[1:], [k, k], color="black", linewidth=0.8, marker="|", markersize=5)
-        axis.annotate(number(value[0]), (max(value[0], value[2], 0), k), xytext=(5, 0), textcoords="offset points",
-                      va="center", fontsize=7, annotation_clip=False)
-    axis.set_yticks(range(len(rows)), list(rows))
-    axis.tick_params(axis="y", length=0, labelsize=8)
-    axis.set_ylim(len(rows) - 0.5, -0.5)
-    if entry.get("log"):
-        axis.set_xscale("log")
-    else:
-        axis.locator_params(axis="x", nbins=5)
-    axis.set_xlabel(title)
-    if any(v is not None and v[2] > v[1] for v in rows.values()):
-        notes.append("Medians with their range")
-    return Drawing(figure, runs, notes)
-
-
-KINDS = {"convergence": convergence, "power_law": power_law, "work_precision": work_precision, "profile": profile, "field": field_maps,
-         "history": history, "curve": curve, "bars": bars, "stability_matrix": stability_matrix}
+from .drawing import FigureError
 
 
 def draw(study, entry, style):
     """Draws one declared figure; raises FigureError or ResultError with the reason when it cannot."""
     try:
-        return KINDS[entry["kind"]](study, entry, style)
+        return FIGURE_KINDS[entry["kind"]].draw(study, entry, style)
     except (FigureError, ResultError):
         raise
     except Exception as error:  # odd data must not take the report with it

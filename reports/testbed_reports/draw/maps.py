@@ -9,10 +9,14 @@ from matplotlib.patches import Rectangle
 
 from ..grade import components
 from ..grade.components import of_snapshot
+from ..read.figure_tables import figure_kind
+from ..read.study_reader import FLAG, LIST, NUMBER, TEXT, WHOLE
 from ..read.spelling import did_you_mean
 from .drawing import (Drawing, FigureError, axis_scale, by_series, chosen, one_size, snapshot_of, where_of_title, with_result,
                       with_unit)
 from .style import WIDTH, plt
+
+PATTERNS = ("checker", "strata")
 
 SAND = ("#E3CD9B", "#7A5C36")  # light and dark stripes
 INCLUSION, OUTLINE, WALL = "0.62", "0.1", "0.45"
@@ -106,7 +110,7 @@ def _stripes(snapshot, entry):
     corner, extent = X.min(axis=0) - h / 2, np.ptp(X, axis=0) + h
     spacing = entry.get("spacing", _stripe(extent.min(), h))
     index = np.floor((X - corner) / spacing * (1 + 1e-9)).astype(int)
-    number = index[:, 1] if entry.get("pattern", "checker") == "strata" else index.sum(axis=1)
+    number = index[:, 1] if entry.get("pattern", PATTERNS[0]) == "strata" else index.sum(axis=1)
     light, dark = (np.array([int(c[k:k + 2], 16) / 255 for k in (1, 3, 5)]) for c in SAND)
     return np.where((number % 2 == 0)[:, None], light, dark)
 
@@ -293,6 +297,19 @@ def _notes(entry, snapshots):
     return notes
 
 
+def _check_keys(reader, entry, index):
+    if ("component" in entry) == entry.get("deformed_grid", False):
+        reader.fail(f"[[figure]] number {index + 1} needs either the key 'component' or 'deformed_grid = true'",
+                    "kind", "figure", index)
+    for key in {"pattern", "spacing"} & set(entry) if "component" in entry else ():
+        reader.fail(f"'{key}' in [[figure]] number {index + 1} means nothing without 'deformed_grid = true'", key, "figure", index)
+    reader.choice(entry.get("pattern", PATTERNS[0]), PATTERNS, "pattern", "figure", index)
+    if entry.get("spacing", 1) <= 0:
+        reader.fail(f"'spacing' in [[figure]] number {index + 1} must be positive", "spacing", "figure", index)
+
+
+@figure_kind("field", {}, {"component": TEXT, "L": NUMBER, "range": LIST, "error": FLAG, "columns": WHOLE, "snapshot": WHOLE + LIST,
+                          "inclusions": FLAG, "curves": LIST, "deformed_grid": FLAG, "pattern": TEXT, "spacing": NUMBER}, _check_keys)
 def field_maps(study, entry, style):
     """Panels: variants across, snapshots down; errors, where there are any, below the values."""
     notes = []

@@ -7,6 +7,7 @@ from matplotlib.patches import Rectangle
 
 from ..grade.targets import number
 from ..grade.verdicts import LEVELS, WORDS, bound_text, of_case
+from ..read.figure_tables import figure_kind
 from ..read.study_file import same
 from .drawing import Drawing, FigureError
 from .style import WIDTH, plt
@@ -187,6 +188,7 @@ def limit_table(study, matrix):
                  ["method", *(f"{matrix.parameter} = {value_text(v)}" for v in matrix.values)], rows)
 
 
+@figure_kind("stability_matrix")
 def stability_matrix(study, entry, style):
     """The whole matrix on one picture: cases down, methods across, in each place one square for each value of the parameter."""
     if not study.spec.cases:

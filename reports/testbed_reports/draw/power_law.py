@@ -6,10 +6,13 @@ from matplotlib.lines import Line2D
 
 from ..grade.convergence import fit_power
 from ..grade.targets import in_sizes, number, values_by_size
+from ..read.figure_tables import figure_kind
+from ..read.study_reader import NUMBER, TEXT
 from .drawing import Drawing, FigureError, by_series, chosen, log_y, name_of, rails, sizes_axis
 from .style import WIDTH, frame, legend_below, legend_shape
 
 
+@figure_kind("power_law", {"quantity": TEXT}, {"norm": TEXT, "L_from": NUMBER, "L_to": NUMBER})
 def power_law(study, entry, style):
     """Every run as a faint dot, the means of cell sizes, and the fitted line a L^q with the 95 % interval of q."""
     quantity, norm, notes = entry["quantity"], entry.get("norm", ""), []

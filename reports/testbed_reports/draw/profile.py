@@ -7,6 +7,8 @@ from matplotlib.lines import Line2D
 
 from ..grade import components
 from ..grade.components import of_snapshot
+from ..read.figure_tables import figure_kind
+from ..read.study_reader import LIST, NUMBER, TEXT, WHOLE
 from .drawing import (Drawing, FigureError, axis_scale, by_series, chosen, one_size, short, snapshot_of, where_of_title, with_result,
                       with_unit)
 from .style import EXACT, WIDTH, frame, legend_below, legend_shape
@@ -113,6 +115,7 @@ def _frame(panels, legend_rows, width):
                  rails=1.4 if len(panels) > 1 else 0, sharex=True, sharey=True)
 
 
+@figure_kind("profile", {"component": TEXT}, {"along": TEXT, "panels": TEXT, "L": NUMBER + LIST, "band": LIST, "snapshot": WHOLE})
 def profile(study, entry, style):
     """Points of each run in the panel of its variant or cell size, over the exact solution."""
     component, along, split_by, notes = entry["component"], entry.get("along", "y"), entry.get("panels", "variant"), []

@@ -8,6 +8,8 @@ from matplotlib.ticker import NullFormatter
 
 from ..grade import metrics
 from ..grade.targets import number
+from ..read.figure_tables import figure_kind
+from ..read.study_reader import NUMBER, TEXT
 from .drawing import Drawing, FigureError, by_series, chosen, exact_of, log_y, lower_edge, name_of, rails
 from .style import WIDTH, frame, legend_below, legend_shape
 
@@ -148,6 +150,16 @@ def _medians(series, x):
     return "Medians of repeats" + (" with their range" if ranges else "") + "; set-up and output are left out"
 
 
+def _check_keys(reader, entry, index):
+    axes = (entry.get("x", "solve_s"), entry.get("y", "error"))
+    if axes not in (("solve_s", "error"), ("dofs", "error"), ("dofs", "solve_s")):
+        reader.fail(f"'x' and 'y' in [[figure]] number {index + 1} must be solve_s and error, dofs and error, or dofs and solve_s",
+                    "x" if "x" in entry else "y", "figure", index)
+    if entry.get("exact") == 0:
+        reader.fail(f"'exact' in [[figure]] number {index + 1} must not be zero: errors are relative to it", "exact", "figure", index)
+
+
+@figure_kind("work_precision", {"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "y": TEXT, "exact": NUMBER}, _check_keys)
 def work_precision(study, entry, style):
     """Error against seconds or unknowns, or seconds against unknowns. Where a method ran with several settings at one cell size, all are
     shown and its line joins those that nothing of its own beats (against unknowns: the fastest)."""

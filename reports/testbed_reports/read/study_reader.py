@@ -7,9 +7,9 @@ from pathlib import Path
 from .spelling import did_you_mean
 from .values import flatten
 
-NUMBER, TEXT, LIST, TABLE, FLAG = (int, float), (str,), (list,), (dict,), (bool,)
+NUMBER, WHOLE, TEXT, LIST, TABLE, FLAG = (int, float), (int,), (str,), (list,), (dict,), (bool,)
 TYPE_NAMES = {NUMBER: "a number", TEXT: "a string", LIST: "a list", TABLE: "a table", FLAG: "true or false",
-              (int,): "a whole number", (int,) + LIST: "a whole number or a list of such", TEXT + LIST: "a string or a list of strings",
+              WHOLE: "a whole number", WHOLE + LIST: "a whole number or a list of such", TEXT + LIST: "a string or a list of strings",
               NUMBER + LIST: "a number or a list of numbers", TEXT + NUMBER: "a string or a number"}
 
 
