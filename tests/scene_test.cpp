@@ -70,6 +70,7 @@ TEST(Scene, ConstantsInAnyOrderAndTheCellSize)
 {
     const Scene scene = test::load(replaced(minimal, "H = 4.0", "H = \"2*a\"\na = \"4*L\"\nb = \"H+pi\""));
     EXPECT_DOUBLE_EQ(scene.grid.size[1], 4);
+    EXPECT_NE(problems_of(replaced(minimal, "H = 4.0", "H = 4.0\n\"a-b\" = 1")).find("letters"), std::string::npos);
     EXPECT_NE(problems_of(replaced(minimal, "H = 4.0", "H = \"2*a\"\na = \"H\"")).find("constants"), std::string::npos);
     EXPECT_NE(problems_of(replaced(minimal, "H = 4.0", "H = 4.0\nx = 1")).find("taken"), std::string::npos);
 }
@@ -184,7 +185,7 @@ TEST(Scene, BadInput)
     expect_problem({"body.block.shape=\"\""}, {"'' is not a choice"});
     expect_problem({"lpfdm.support=\"\""}, {"'' is not a choice"});
     expect_problem({"body.block.name=\"a/b\""}, {"body[0].name"});
-    expect_problem({"constants.a-b=1"}, {"constants.a-b", "letters"});
+    expect_problem({"constants.h=1"}, {"--set constants.h", "no constant 'h'", "did you mean 'H'"});
     expect_problem({"constants.H=\"4,5\""}, {"not a list"});
     expect_problem({"output.snapshots=20000"}, {"output.snapshots"});
     expect_problem({"lpfdm.hourglass=0.6"}, {"lpfdm.hourglass"});

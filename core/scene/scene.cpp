@@ -49,6 +49,23 @@ int line_of_deep_key(std::string_view text)
     return 0;
 }
 
+/// Whether a path is that of a constant which the scene does not have: set it would change nothing.
+bool is_unknown_constant(const toml::table& root, const std::string& path, Problems& problems)
+{
+    const std::string table = "constants.";
+    if (!path.starts_with(table))
+        return false;
+    const std::string name = path.substr(table.size());
+    std::vector<std::string> names;
+    if (const toml::table* constants = root["constants"].as_table())
+        for (const auto& [key, value] : *constants)
+            names.emplace_back(key.str());
+    const bool is_unknown = std::find(names.begin(), names.end(), name) == names.end();
+    if (is_unknown)
+        problems.add("--set " + path, fmt::format("the scene has no constant '{}'", name) + suggestion(name, names));
+    return is_unknown;
+}
+
 void set_override(toml::table& root, const std::string& assignment, Problems& problems)
 {
     const auto equals = assignment.find('=');
@@ -57,6 +74,8 @@ void set_override(toml::table& root, const std::string& assignment, Problems& pr
     const std::string path = assignment.substr(0, equals), text = assignment.substr(equals + 1);
     if (std::count(path.begin(), path.end(), '.') > deepest_key)
         return problems.add("--set " + path, fmt::format("a key of more than {} parts", deepest_key));
+    if (is_unknown_constant(root, path, problems))
+        return;
     toml::table value;
     try
     {
@@ -159,6 +178,13 @@ const BodySpec& Scene::body(const std::string& name) const
 bool Scene::may_flow() const
 {
     return std::any_of(bodies.begin(), bodies.end(), [&](const BodySpec& body) { return material(body.material).has_strength(); });
+}
+
+std::string Scene::case_name() const
+{
+    const auto file = std::filesystem::absolute(path).lexically_normal();
+    const std::string folder = file.parent_path().filename().string(), own = file.stem().string();
+    return own == "scene" ? folder : folder + "-" + own;
 }
 
 Constants Scene::expression_constants() const

@@ -81,7 +81,8 @@ struct Scene
         return const_cast<Scene*>(this)->options<Options>();
     }
     /// Name of the folder that holds the scene.
-    std::string case_name() const { return std::filesystem::absolute(path).lexically_normal().parent_path().filename().string(); }
+    /// Of the folder of the scene's file, and of the file where that is not scene.toml.
+    std::string case_name() const;
     const MaterialSpec& material(const std::string& name) const;
     const BodySpec& body(const std::string& name) const;
     /// Whether the law of some body has a strength, so that it may flow or break.

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from synthetic import write_result, write_study
-from testbed_reports.grade.dataset import metrics_csv, read_study_folder
+from testbed_reports.grade.dataset import read_study_folder
+from testbed_reports.grade.metrics_csv import metrics_csv
 from testbed_reports.page.report import build
 from testbed_reports.read.results import Result
 

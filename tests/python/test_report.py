@@ -88,7 +88,8 @@ def report(tmp_path_factory):
                          history={"strain_energy": [1.0] * 80 + [2.0]})
     bad = folder / "runs" / "lpfdm_L1_r1_0" / "result.h5"
     bad.write_bytes(bad.read_bytes()[:5000])
-    write_result(folder / "runs" / "stale_0" / "result.h5", variant="stale")
+    write_result(folder / "runs" / "stale_0a1b2c3d-4e5f" / "result.h5", variant="stale")
+    write_result(folder / "runs" / "cb-geo_fine" / "result.h5", variant="cb-geo")
     broken = root / "studies" / "broken"
     broken.mkdir()
     (broken / "study.toml").write_text("title = 1\n")
@@ -164,7 +165,8 @@ def test_page_says_what_failed(page):
     for told in ("velocity above &lt;c_p&gt;", "killed by signal 9", "unreadable", "nonsense", "not drawn", "the whole study",
                  "testbed-fem) is not built", "abc1234", "theory &lt;&amp;&gt;", "testbed study column.toml"):
         assert told in text, told
-    assert "stale" not in text
+    assert "stale" not in text  # a run of an earlier plan
+    assert "cb-geo_fine" in text and "of another code" in text
 
 
 def test_verdicts_on_page(page):

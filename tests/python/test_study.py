@@ -167,6 +167,45 @@ def test_a_scene_that_check_refuses_runs_nothing(bench):
     assert done.returncode == 1 and "grid.cel_size" in done.stderr and not bench.calls
 
 
+def test_one_wrong_key_is_told_once(bench):
+    bench.write(STUDY.replace("[axes]", '[set]\n"grid.cel_size" = 1.0\n[axes]'))
+    done = bench.run()
+    assert done.returncode == 1 and done.stderr.count("unknown key") == 1 and "and 3 more combinations" in done.stderr
+
+
+def test_combinations_that_mean_one_scene_are_refused(bench):
+    (bench.folder / "twin.toml").write_text((bench.folder / "scene.toml").read_text())
+    bench.write(STUDY.replace('scene = "scene.toml"\n', "").replace("[axes]", '[axes]\nscene = ["scene.toml", "twin.toml"]'))
+    done = bench.run()
+    assert done.returncode == 1 and "the same scene" in done.stderr and "scene = twin.toml" in done.stderr and not bench.calls
+
+
+def test_scenes_of_one_folder_are_cases_of_their_own(bench):
+    (bench.folder / "soft.toml").write_text('method = "lpfdm"\n# soft\n')
+    bench.write(STUDY.replace('scene = "scene.toml"\n', "").replace("[axes]", '[axes]\nscene = ["scene.toml", "soft.toml"]'))
+    assert bench.run("--quiet").returncode == 0
+    folder = bench.folder.name
+    assert {row["case"] for row in bench.rows} == {folder, f"{folder}-soft"}
+
+
+def test_a_column_for_each_axis_and_rows_of_what_was_recorded(bench):
+    bench.write(STUDY.replace("[axes]", '[axes]\n"damping.local" = [0.1, 0.2]'))
+    assert bench.run("--quiet").returncode == 0
+    assert {row["damping.local"] for row in bench.rows} == {"0.1", "0.2"}
+    ends = {row["norm"] for row in bench.rows if row["quantity"] == "displacement_end"}
+    assert {"tip.x", "tip.y"} <= ends
+
+
+def test_a_result_of_another_code_in_the_folder_is_taken(bench):
+    bench.run("--quiet")
+    ours = next((bench.out / "runs").iterdir())
+    (bench.out / "runs" / "other_code").mkdir()
+    (bench.out / "runs" / "other_code" / "result.h5").write_bytes((ours / "result.h5").read_bytes())
+    done = bench.run()
+    assert "results that this study did not run are taken: other_code" in done.stderr
+    assert "other_code" in {row["run_id"] for row in bench.rows}
+
+
 def test_interruption_leaves_a_folder_to_go_on_from(bench):
     bench.behave(**{"mpm-linear": "sleep"})
     process = subprocess.Popen(bench.command("-j", "2"), env=bench.environment, stderr=subprocess.PIPE, text=True)

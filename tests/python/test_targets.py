@@ -1,4 +1,6 @@
 """Each kind of target, passing and failing."""
+from types import SimpleNamespace
+
 import pytest
 from synthetic import write_study
 from testbed_reports.grade.dataset import read_study_folder
@@ -121,3 +123,11 @@ def test_a_size_counts_with_the_mean_of_its_runs():
     sizes, means, lost = mean_by_size(runs, "stress", "max")
     assert sizes.tolist() == [0.25, 0.5] and means.tolist() == [3.0, 2.0]
     assert lost == [runs[4]]
+
+
+def test_a_known_failure_is_told_and_its_end_is_a_failure(study):
+    known = verdict(study, "value_max", AT, value=0.001, known="the law makes it")
+    assert known.verdict == "known" and known.note.startswith("the law makes it")
+    gone = verdict(study, "value_max", AT, value=1.0, known="the law makes it")
+    assert gone.verdict == "fail" and "passes, although" in gone.note
+    assert verdict(study, "value_max", {"variant": "fem-q2"}, value=1.0, known="x").verdict == "not run"

@@ -1,9 +1,8 @@
 """A study's folder in memory: its runs, their results and their rows of metrics."""
-import csv
-import io
 import json
 import math
 import os
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,8 +12,6 @@ from . import metrics
 from .limits import find_limits
 from .verdicts import judge_study
 
-CSV_COLUMNS = ("run_id", "case", "method", "variant", "L", "ppc", "dt", "seed", "quantity", "norm", "value",
-               "solve_s", "particle_steps", "status", "soundness", "cause", "remedy")
 PLAN = "plan.json"
 
 
@@ -74,6 +71,7 @@ class Study:
     plan: dict
     runs: list
     left_out: list
+    outside: list = field(default_factory=list)  # ids of results that no plan has made
     limits: list = field(default_factory=list)  # found by searches
 
     def case(self, name):
@@ -151,6 +149,16 @@ def _check_plan(path, plan):
         raise StudyError(f"{path}: a run has no 'id'")
 
 
+OWN_RUN = re.compile(r"_[0-9a-f]{8}-[0-9a-f]{4}")  # how the id of a run of a plan ends
+
+
+def outside_runs(folder, plan):
+    """Ids of the results that lie in runs/ beside those that plans have made: of other codes."""
+    planned = {entry["id"] for entry in plan.get("runs", [])}
+    found = sorted(p.parent.name for p in (Path(folder) / "runs").glob("*/result.h5"))
+    return [name for name in found if name not in planned and not OWN_RUN.search(name[-14:])]
+
+
 def read_plan(folder):
     """plan.json of a study's folder; without one, every folder under runs/."""
     path = Path(folder) / PLAN
@@ -169,35 +177,10 @@ def read_study_folder(folder):
     """A study's folder, graded. Raises StudyError when the study file or the plan is unusable."""
     folder = Path(folder)
     spec, plan = read_study(folder / "study.toml", need_scene=False), read_plan(folder)
-    runs = [read_run(folder / "runs" / entry["id"], entry) for entry in plan.get("runs", [])]
-    study = Study(folder, spec, plan, runs, plan.get("left_out", []))
+    outside = [{"id": name} for name in outside_runs(folder, plan)]
+    runs = [read_run(folder / "runs" / entry["id"], entry) for entry in plan.get("runs", []) + outside]
+    study = Study(folder, spec, plan, runs, plan.get("left_out", []), [entry["id"] for entry in outside])
     if spec.cases:
         judge_study(study)
         study.limits = find_limits(study)
     return study
-
-
-def _number(value):
-    return repr(float(value)) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
-
-
-def _count(value):
-    return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else value
-
-
-def metrics_csv(runs):
-    """metrics.csv of the runs that have a finished result, as text."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(CSV_COLUMNS)
-    for run in runs:
-        if run.result is None or not run.result.finished:
-            continue
-        performance = run.result.performance
-        for (quantity, norm), value in run.rows.items():
-            writer.writerow([run.id, run.values["case"], run.result.method, run.result.variant,
-                             _number(run.values["L"]), run.values["ppc"], _number(run.values["dt"]),
-                             run.values["seed"], quantity, norm, repr(float(value)),
-                             _number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")),
-                             run.status, run.result.soundness, run.result.cause, run.result.remedy])
-    return out.getvalue()

@@ -1,6 +1,6 @@
 """Expectations of a study, judged against its runs."""
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ NOT_CONVERGING_ORDER = 0.5
 
 @dataclass
 class Verdict:
-    """`verdict` is 'pass', 'fail' or 'not run'; `note` says why when it is not plain."""
+    """`verdict` is 'pass', 'fail', 'known' (fails, and the study says why) or 'not run'; `note` says why when it is not plain."""
     label: str
     asked: str
     measured: str
@@ -181,7 +181,16 @@ def judge(target, study):
     ratios = [r for r in ratios if math.isfinite(r)]
     if ratios and quantity != "static":  # a static number never stands without it
         note = "; ".join(filter(None, (note, f"kinetic/strain energy ≤ {number(max(ratios))}")))
-    return Verdict(**base, measured=measured, verdict=verdict, note=note)
+    return _with_known(target, Verdict(**base, measured=measured, verdict=verdict, note=note))
+
+
+def _with_known(target, verdict):
+    """A failure that the study knows of is no surprise; that it has gone is one."""
+    if "known" not in target:
+        return verdict
+    if verdict.verdict == "pass":
+        return replace(verdict, verdict="fail", note="; ".join(filter(None, ("passes, although `known` says that it fails", verdict.note))))
+    return replace(verdict, verdict="known", note="; ".join(filter(None, (target["known"], verdict.note))))
 
 
 def judge_all(study):

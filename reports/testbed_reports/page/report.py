@@ -35,6 +35,11 @@ def find_studies(folders):
             inside = [folder]
         else:
             inside = sorted(p.parent for p in folder.glob("*/study.toml"))
+            lost = sorted({p.parent.parent.parent for p in folder.glob("*/runs/*/result.h5")} - set(inside))
+            lost += [folder] if any(folder.glob("runs/*/result.h5")) else []
+            if lost:
+                raise StudyError(f"{lost[0]}: holds results but no study.toml, which says what they are: write one (a title and an axis `scene` will "
+                                 "do), or name the folders of the other studies")
         if not inside and not (folder / bench.FILE).is_file():
             raise StudyError(f"{folder}: holds no study (no study.toml)")
         found += inside
@@ -191,7 +196,8 @@ def _write_gallery(out, title, sections):
 
 
 def build(folders, out, command, unreadable=None):
-    """Writes the report of studies into the folder `out`; returns the path of the page. `unreadable`: a list for what could not be read."""
+    """Writes the report of studies into the folder `out`; returns the path of the page. `unreadable`: a list for what could not be read or
+    drawn."""
     out = Path(out)
     studies, failures = [], []
     unreadable = [] if unreadable is None else unreadable
@@ -205,6 +211,7 @@ def build(folders, out, command, unreadable=None):
     for name in ("figures", "tables"):
         (out / name).mkdir(parents=True, exist_ok=True)
     for study in studies:
+        failures += [[study.name, name, "of another code", "no run of the study's plan: its result lies in runs/ and is taken"] for name in study.outside]
         for run in study.runs:
             if (run.suspect or not run.completed) and not study.spec.cases:  # the matrix tells of these
                 failures.append([study.name, run.id, run.label, run.told])
@@ -215,6 +222,7 @@ def build(folders, out, command, unreadable=None):
     style = Style(_figure_labels(studies) + _bench_labels(benches))
     verdicts = [(study, judge_all(study)) for study in studies]
     sections = [_study_section(study, style, out, command, failures) for study in studies]
+    unreadable += [f"{name}: {what}: {reason}" for name, what, how, reason in failures if how == "not drawn"]
     for (study, judged), section in zip(verdicts, sections):
         for table in section["tables"] + ([targets_table(judged)] if judged else []):
             _write_table(out, study, table)
@@ -229,7 +237,7 @@ def build(folders, out, command, unreadable=None):
     gallery = _write_gallery(out, title, sections)
     page = render("template.html", title=title, gallery=gallery, provenance=rows, warnings=warnings,
                   studies=sections, verdicts=flat,
-                  counts=", ".join(f"{counted[k]} {k}" for k in ("pass", "fail", "not run") if counted[k]) + ".",
+                  counts=", ".join(f"{counted[k]} {k}" for k in ("pass", "fail", "known", "not run") if counted[k]) + ".",
                   failures=Table("failures", "Failures", ["study", "what", "status", "reason"], failures, 4),
                   left_out=Table("left_out", "Left out", ["study", "variant", "combination", "reason"], left_out, 4))
     write_atomically(out / "report.html", page)
@@ -256,5 +264,5 @@ def main(arguments=None):
     print(os.path.relpath(page))
     if unreadable:
         more = f"\n  and {len(unreadable) - 20} more" if len(unreadable) > 20 else ""
-        print("testbed report: these could not be read, the report goes without them:\n  " + "\n  ".join(unreadable[:20]) + more, file=sys.stderr)
+        print("testbed report: these could not be read or drawn, the report goes without them:\n  " + "\n  ".join(unreadable[:20]) + more, file=sys.stderr)
     return 1 if unreadable else 0

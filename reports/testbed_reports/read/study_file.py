@@ -21,7 +21,7 @@ REMEDY_KEYS = {"failure": TEXT, "label": TEXT, "without": TABLE, "with": TABLE}
 COLUMNS = ("case", "method", "variant", "L", "ppc", "dt", "seed", "repeat", "bracket")
 
 TARGET_KEYS = {"label": TEXT, "quantity": TEXT, "norm": TEXT, "where": TABLE, "kind": TEXT, "value": NUMBER,
-               "low": NUMBER, "high": NUMBER, "L_from": NUMBER, "L_to": NUMBER, "source": TEXT}
+               "low": NUMBER, "high": NUMBER, "L_from": NUMBER, "L_to": NUMBER, "source": TEXT, "known": TEXT}
 # kind -> keys that it needs
 TARGET_KINDS = {"value_max": ("value",), "value_min": ("value",), "value_between": ("low", "high"),
                 "order_min": ("value",), "order_between": ("low", "high"), "not_converging": (),

@@ -9,16 +9,15 @@ import re
 import shlex
 import shutil
 import signal
-import subprocess
 import sys
-import tomllib
-from collections import Counter
 from pathlib import Path
 
-from ..grade.dataset import PLAN, metrics_csv, read_study_folder, write_atomically
+from ..grade.dataset import PLAN, read_study_folder, write_atomically
+from ..grade.metrics_csv import metrics_csv
 from ..grade.targets import as_text, judge_all
 from ..read.results import is_finished, seed_of
 from ..read.study_file import StudyError, read_study, toml_value
+from .resolve import Refused, method_of, refusals, refuse_twins, resolve, run_arguments
 from .runner import Task, run_all
 from .search import Searches, name_of
 
@@ -50,9 +49,14 @@ def is_fem(method):
     return family(method) == "fem"
 
 
+def name_of_scene(scene):
+    """Of its folder, and of its file where that is not scene.toml, as the solver writes it."""
+    return scene.parent.name + ("" if scene.stem == "scene" else f"-{scene.stem}")
+
+
 def case_of(combination):
-    """The name of the study's [[case]], else of the folder that holds the scene, as the solver writes it."""
-    return combination.case or combination.scene.resolve().parent.name
+    """The name of the study's [[case]], else of the scene."""
+    return combination.case or name_of_scene(combination.scene.resolve())
 
 
 def points_per_cell(resolved):
@@ -74,45 +78,13 @@ def readable(method, axes, repeat, case=""):
     parts = [case, method] if case else [method]
     for key, value in axes.items():
         if key == "scene":
-            parts.insert(0, Path(value).parent.name)
+            parts.insert(0, name_of_scene(Path(value)))
         elif key != "method":
             short = {"grid.cell_size": "L"}.get(key, key.rsplit(".", 1)[-1])
             text = f"{value:g}" if isinstance(value, float) else toml_value(value)
             parts.append(short + text)
     parts.append(f"r{repeat}")
     return re.sub(r"[^\w.+=-]+", "", "_".join(parts))[:120]
-
-
-def run_arguments(combination):
-    """Arguments that choose scene, method and settings, for `run` and `check` alike."""
-    arguments = [str(combination.scene)]
-    if combination.method:
-        arguments += ["--method", combination.method]
-    for key, value in combination.sets.items():
-        arguments += ["--set", f"{key}={toml_value(value)}"]
-    return arguments
-
-
-def resolve(testbed, combination):
-    """The resolved scene of a combination as TOML text."""
-    done = subprocess.run([str(testbed), "check", *run_arguments(combination), "--resolved"],
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
-    if done.returncode != 0:
-        told = (done.stderr.strip() or done.stdout.strip() or f"exit code {done.returncode}")
-        raise StudyError(f"{combination.scene}: refused by 'testbed check' "
-                         f"({shlex.join(run_arguments(combination)[1:])}):\n{told}")
-    try:
-        return done.stdout, tomllib.loads(done.stdout)
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"{combination.scene}: 'testbed check --resolved' did not print TOML: {error}") from error
-
-
-def method_of(scene):
-    """The method that a scene file names, '' if none."""
-    try:
-        return str(tomllib.loads(scene.read_text(encoding="utf-8")).get("method", ""))
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise StudyError(f"{scene}: {error}") from error
 
 
 def rerun_command(combination):
@@ -138,14 +110,15 @@ def expand(study, combinations, testbed, folder, keep, jobs):
             chosen.append((combination, method))
     with concurrent.futures.ThreadPoolExecutor(max(1, jobs)) as pool:
         futures = [pool.submit(resolve, testbed, c) for c, _ in chosen]
-        scenes, problems = [], []
+        scenes, refused = [], []
         for future in futures:
             try:
                 scenes.append(future.result())
-            except StudyError as error:
-                problems.append(str(error))
-        if problems:
-            raise StudyError("\n".join(dict.fromkeys(problems)))
+            except Refused as error:
+                refused.append(error)
+        if refused:
+            raise StudyError(refusals(refused))
+    refuse_twins(study, chosen, scenes)
 
     entries, tasks = [], []
     for (combination, method), (text, resolved) in zip(chosen, scenes):
@@ -167,9 +140,6 @@ def expand(study, combinations, testbed, folder, keep, jobs):
                 command = [str(testbed), "run", *run_arguments(combination), "--threads", str(combination.threads),
                            "-o", str(out / "result.h5"), "--quiet"]
                 tasks.append(Task(run_id, out, command))
-    twice = next((i for i, n in Counter(e["id"] for e in entries).items() if n > 1), None)
-    if twice:
-        raise StudyError(f"{study.path}: two combinations resolve to the same run {twice}: an axis has no effect")
     return entries, left_out, tasks
 
 
@@ -260,6 +230,8 @@ def run_study(study, testbed, out, jobs, keep, quiet, command):
         _write_plan(folder, plan)
         data = read_study_folder(folder)
         write_atomically(folder / "metrics.csv", metrics_csv(data.runs))
+        if data.outside:
+            progress.say(f"{study.name}: results that this study did not run are taken: {', '.join(data.outside)}")
         for run in data.runs:
             for error in run.errors:
                 progress.say(f"{study.name}: {run.id}: {error}")

@@ -1,0 +1,65 @@
+"""What combinations mean to the solver: scenes as `testbed check` resolves them."""
+import shlex
+import subprocess
+import tomllib
+
+from ..read.study_file import StudyError, toml_value
+
+
+def run_arguments(combination):
+    """Arguments that choose scene, method and settings, for `run` and `check` alike."""
+    arguments = [str(combination.scene)]
+    if combination.method:
+        arguments += ["--method", combination.method]
+    for key, value in combination.sets.items():
+        arguments += ["--set", f"{key}={toml_value(value)}"]
+    return arguments
+
+
+class Refused(StudyError):
+    """A combination that `testbed check` refuses."""
+
+    def __init__(self, combination, told):
+        self.scene, self.told, self.arguments = combination.scene, told, shlex.join(run_arguments(combination)[1:])
+        super().__init__(told)
+
+
+def refusals(refused):
+    """One message for all combinations that are refused with the same words."""
+    texts = []
+    for key in dict.fromkeys((r.scene, r.told) for r in refused):
+        same = [r for r in refused if (r.scene, r.told) == key]
+        more = f" and {len(same) - 1} more combinations" if len(same) > 1 else ""
+        texts.append(f"{key[0]}: refused by 'testbed check' ({same[0].arguments}){more}:\n{key[1]}")
+    return "\n".join(texts)
+
+
+def refuse_twins(study, chosen, scenes):
+    """Two combinations of a case that mean the same scene would stand side by side as if they differed."""
+    seen = {}
+    for (combination, method), (text, _) in zip(chosen, scenes):
+        key = (combination.case, method, combination.threads, text)
+        if key in seen:
+            first, second = (", ".join(f"{k} = {v}" for k, v in c.axes.items()) for c in (seen[key], combination))
+            raise StudyError(f"{study.path}: two combinations are the same scene, an axis has no effect: {first}; and {second}")
+        seen[key] = combination
+
+
+def resolve(testbed, combination):
+    """The resolved scene of a combination as TOML text."""
+    done = subprocess.run([str(testbed), "check", *run_arguments(combination), "--resolved"],
+                          stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+    if done.returncode != 0:
+        raise Refused(combination, done.stderr.strip() or done.stdout.strip() or f"exit code {done.returncode}")
+    try:
+        return done.stdout, tomllib.loads(done.stdout)
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"{combination.scene}: 'testbed check --resolved' did not print TOML: {error}") from error
+
+
+def method_of(scene):
+    """The method that a scene file names, '' if none."""
+    try:
+        return str(tomllib.loads(scene.read_text(encoding="utf-8")).get("method", ""))
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise StudyError(f"{scene}: {error}") from error
