@@ -225,6 +225,20 @@ TEST(Scene, WarnsOfLocking)
     EXPECT_TRUE(warnings("mpm-linear-bbar", {"material.soil.poissons_ratio=0.49"}).empty());
 }
 
+TEST(Scene, WarnsOfStressThatGravityDoesNotCarryYet)
+{
+    const std::string text =
+        minimal + "initial_stress = [\"Y - H\", \"Y - H\", \"Y - H\", \"0\"]\n[gravity]\nacceleration = [0.0, -9.81]\nramp = ";
+    const auto warnings = [&](const std::string& ramp)
+    {
+        const test::SceneFile file(text + ramp + "\n");
+        return load_scene(file.path(), "lpfdm").warnings;
+    };
+    ASSERT_EQ(warnings("0.5").size(), 1u);
+    EXPECT_NE(warnings("0.5")[0].find("heaves"), std::string::npos);
+    EXPECT_TRUE(warnings("0.0").empty());
+}
+
 TEST(Documentation, NamesEveryTable)
 {
     const std::string all = scene_documentation();

@@ -46,7 +46,7 @@ std::filesystem::path own_directory()
     if (std::filesystem::exists(beside))
         ::execv(beside.c_str(), argv.data());
     ::execvp(program.c_str(), argv.data());
-    throw SceneError(fmt::format("'{}' is not built or not installed ({}); the FEM reference needs deal.II, study and report need Python",
+    throw SceneError(fmt::format("'{}' is not built or not installed ({}); the FEM reference needs deal.II, study, report and plot need Python",
                                  program, std::strerror(errno)));
 }
 
@@ -212,6 +212,7 @@ struct CommandLine
         app.add_subcommand("list", "methods and material laws");
         app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
         app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
+        app.add_subcommand("plot", "picture of results: testbed plot RESULT.h5... [--field F] [-o FILE]");
     }
 };
 
@@ -234,9 +235,10 @@ void point(const std::string& law, const std::string& csv)
 
 int run(int argc, char** argv)
 {
-    // study and report are programs of their own, found the way git finds its subcommands
-    if (argc > 1 && (std::string(argv[1]) == "study" || std::string(argv[1]) == "report"))
-        become(std::string("testbed-") + argv[1], rest_of(argc, argv, 2));
+    // these are programs of their own, found the way git finds its subcommands
+    for (const char* name : {"study", "report", "plot"})
+        if (argc > 1 && std::string(argv[1]) == name)
+            become(std::string("testbed-") + name, rest_of(argc, argv, 2));
 
     CommandLine line;
     try

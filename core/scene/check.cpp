@@ -131,6 +131,13 @@ void check_scene(const Scene& scene, const SceneBounds& bounds, Problems& proble
 
 void check_limits(const Scene& scene, Problems& problems)
 {
+    if (scene.gravity && scene.gravity->ramp > 0 && !scene.confinement)
+        for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+            if (scene.bodies[k].initial_stress)
+                problems.warn(
+                    fmt::format("body[{}].initial_stress", k),
+                    "is there at once, and gravity over gravity.ramp: without the weight that it carries the body heaves first; ramp = 0 "
+                    "goes with it");
     if (scene.confinement && scene.confinement->pressure > 0)
         for (std::size_t k = 0; k < scene.bodies.size(); ++k)
             if (!scene.bodies[k].initial_stress)

@@ -8,7 +8,8 @@ from synthetic_soil import lattice, vectors, write_soil_study
 from testbed_reports.grade.dataset import read_study_folder
 from testbed_reports.draw.drawing import FigureError
 from testbed_reports.draw.figures import draw
-from testbed_reports.draw.maps import INCLUSION, _stripe
+from testbed_reports.draw.map_layers import stripe
+from testbed_reports.draw.maps import INCLUSION
 from testbed_reports.draw.style import Style
 from testbed_reports.read.results import ResultError
 
@@ -119,7 +120,7 @@ def test_deformed_grid_colours_by_initial_position(study, pattern, same):
 
 @pytest.mark.parametrize("points, expected", [(80, 16), (20, 4), (24, 4), (23, 4), (3, 1)])
 def test_default_stripes_hold_whole_points(points, expected):
-    assert _stripe(points * 0.05, 0.05) == pytest.approx(expected * 0.05)
+    assert stripe(points * 0.05, 0.05) == pytest.approx(expected * 0.05)
 
 
 def test_a_field_that_does_not_change_is_found_in_the_first_snapshot(study):

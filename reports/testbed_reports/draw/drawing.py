@@ -192,8 +192,11 @@ def axis_scale(values, unit):
 
 
 def snapshot_of(run, index):
+    """The snapshot of that number, or the nearest to a time, a float [s]."""
     if not run.result.snapshots:
         raise ResultError(f"{run.id}: lacks snapshots")
+    if isinstance(index, float):
+        return min(run.result.snapshots, key=lambda snapshot: abs(snapshot.time - index))
     try:
         return run.result.snapshots[index]
     except IndexError:

@@ -1,132 +1,37 @@
 """Maps over the points: a field, or stripes of the initial position that show the motion."""
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
-from ..grade import components
-from ..grade.components import of_snapshot
 from ..read.figure_tables import figure_kind
 from ..read.study_reader import FLAG, LIST, NUMBER, TEXT, WHOLE
 from ..read.spelling import did_you_mean
-from .drawing import (Drawing, FigureError, axis_scale, by_series, chosen, one_size, snapshot_of, where_of_title, with_result,
-                      with_unit)
+from .drawing import Drawing, FigureError, by_series, chosen, one_size, snapshot_of, where_of_title, with_result
+from .map_layers import PATTERNS, Layer, field_layers, inclusions, squares, stripes
 from .style import WIDTH, plt
 
-PATTERNS = ("checker", "strata")
-
-SAND = ("#E3CD9B", "#7A5C36")  # light and dark stripes
 INCLUSION, OUTLINE, WALL = "0.62", "0.1", "0.45"
 OVERLAP = 1.25  # of the squares that close the gaps between stretched neighbours
 LEFT, RIGHT, TOP, BOTTOM = 0.5, 1.0, 0.28, 0.42  # inches about the panels
 TALLEST = 2.6  # panel, inches
 
 
-@dataclass
-class Layer:
-    """One quantity over all panels: `data` (N,) in the unit shown or RGB (N, 3), per row and panel (None: no such field)."""
-    title: str
-    data: list
-    low: float = 0.0
-    high: float = 1.0
-    cmap: str = ""
-
-
-def _squares(snapshot, scale=1.0):
-    """Corners (N, 4, 2) of squares with each point's current area times scale^2, about its current position."""
-    centre = snapshot["position"][:, :2]
-    area = snapshot["volume"] if "volume" in snapshot else snapshot["initial_volume"]
-    half = 0.5 * scale * np.sqrt(np.clip(np.nan_to_num(area), 0.0, None))
-    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
-    return centre[:, None, :] + half[:, None, None] * corners[None]
-
-
-def _inclusions(snapshot, entry):
-    """(N,) True for points of bodies other than the first, when they are to be told apart."""
-    count = len(snapshot["position"])
-    if not entry.get("inclusions", True) or "body" not in snapshot:
-        return np.zeros(count, bool)
-    return snapshot["body"] > snapshot["body"].min()
-
-
-def _limits(values, component, given=None):
-    """(low, high, map): 1st to 99th percentile; a diverging map about zero when both signs occur, zero below for a strain."""
-    if given:
-        return given[0], given[1], "RdBu_r" if given[0] < 0 < given[1] else "viridis"
-    finite = np.concatenate(values)
-    finite = finite[np.isfinite(finite)]
-    if not len(finite):
-        return 0.0, 1.0, "viridis"
-    low, high = np.percentile(finite, [1, 99])
-    if component == "plastic_shear_strain":
-        low = 0.0
-    if low < 0 < high and min(-low, high) > 0.1 * max(-low, high):
-        bound = max(-low, high)
-        return -bound, bound, "RdBu_r"
-    return (low, high, "viridis") if high > low else (low - 0.5, high + 0.5, "viridis")
-
-
-def _unit(data, base):
-    """(unit, factor) in which the 99th percentile of the data reads well."""
-    return axis_scale([np.percentile(np.abs(d[np.isfinite(d)]), 99) if np.isfinite(d).any() else [0.0] for d in data], base)
-
-
-def _field_layers(rows, entry):
-    """The values of a component, and the errors where an exact solution is there."""
-    component = entry["component"]
-    name = components.split(component)[0]
-    base = rows[0][0][2].unit(name) or components.default_unit(name)
-    values = [[of_snapshot(s, component) for _, _, s in row] for row in rows]
-    soil = [v[~_inclusions(s, entry)] for row, own in zip(rows, values) for v, (_, _, s) in zip(own, row)]
-    unit, factor = _unit(soil, base)
-    limits = _limits([v * factor for v in soil], component, entry.get("range"))
-    layers = [Layer(with_unit(components.symbol(component), unit), [[v * factor for v in own] for own in values], *limits)]
-    errors = [[v - of_snapshot(s, component, True) if components.has_exact(s, component) else None
-               for v, (_, _, s) in zip(own, row)] for row, own in zip(rows, values)]
-    present = [e for own in errors for e in own if e is not None]
-    if entry.get("error", True) and present:
-        unit, factor = _unit(present, base)
-        low, high, _ = _limits([e * factor for e in present], component)
-        bound = max(abs(low), abs(high)) or 1.0
-        title = with_unit(f"Error of {components.symbol(component).split(' ')[-1]}", unit)
-        layers.append(Layer(title, [[None if e is None else e * factor for e in own] for own in errors], -bound, bound, "PuOr"))
-    return layers
-
-
-def _stripe(across, h):
-    """Default width of a stripe: whole points, about a sixth of the narrow side (`across`), without a rest if some number nearby allows."""
-    points = max(1, round(across / h))
-    even = [k for k in range(math.ceil(points / 8), points // 4 + 1) if points % k == 0]
-    return h * (min(even, key=lambda k: abs(points / k - 6)) if even else max(1, round(points / 6)))
-
-
-def _stripes(snapshot, entry):
-    """RGB (N, 3): a checker or strata of the initial position."""
-    X = snapshot["initial_position"][:, :2]
-    h = math.sqrt(np.median(snapshot["initial_volume"]))
-    corner, extent = X.min(axis=0) - h / 2, np.ptp(X, axis=0) + h
-    spacing = entry.get("spacing", _stripe(extent.min(), h))
-    index = np.floor((X - corner) / spacing * (1 + 1e-9)).astype(int)
-    number = index[:, 1] if entry.get("pattern", PATTERNS[0]) == "strata" else index.sum(axis=1)
-    light, dark = (np.array([int(c[k:k + 2], 16) / 255 for k in (1, 3, 5)]) for c in SAND)
-    return np.where((number % 2 == 0)[:, None], light, dark)
-
-
 def _draw_points(axis, snapshot, data, layer, entry):
     """Squares of the points, larger ones below so that stretched neighbours leave no gaps; inclusions grey and outlined."""
-    grey = _inclusions(snapshot, entry)
+    grey = inclusions(snapshot, entry)
     for order, scale in enumerate((OVERLAP, 1.0)):
-        squares = _squares(snapshot, scale)[~grey]
+        shown = squares(snapshot, scale)[~grey]
         look = {"array": data[~grey], "cmap": layer.cmap, "clim": (layer.low, layer.high)} if layer.cmap else \
             {"facecolors": data[~grey]}
-        mapped = axis.add_collection(PolyCollection(squares, linewidths=0, antialiased=False, rasterized=True,
+        mapped = axis.add_collection(PolyCollection(shown, linewidths=0, antialiased=False, rasterized=True,
                                                     zorder=1 + 0.1 * order, **look))
     for order, (scale, colour) in enumerate(((1.6, OUTLINE), (1.15, INCLUSION))):
         if grey.any():
-            axis.add_collection(PolyCollection(_squares(snapshot, scale)[grey], facecolors=colour, linewidths=0, antialiased=False,
+            axis.add_collection(PolyCollection(squares(snapshot, scale)[grey], facecolors=colour, linewidths=0, antialiased=False,
                                                rasterized=True, zorder=1.3 + 0.1 * order))
     return mapped
 
@@ -169,7 +74,7 @@ def _draw_curves(axis, snapshot, names):
 
 def _view(snapshots):
     """Corners (2,), (2,) of what is shown: all points but for the farthest thousandth, with a margin."""
-    every = np.concatenate([_squares(s).reshape(-1, 2) for s in snapshots])
+    every = np.concatenate([squares(s).reshape(-1, 2) for s in snapshots])
     every = every[np.isfinite(every).all(axis=1)]
     if not len(every):
         raise FigureError("no point has a finite position")
@@ -286,13 +191,53 @@ def _draw_layer(figure, layout, first, layer, rows, view, entry):
         _bar(figure, mapped, layer, layout.bar(first, layout.bands * len(rows)))
 
 
+@dataclass
+class Maps:
+    """What is shown: `series` of (label, run), a row of (label, run, snapshot) for each time, and what all panels share."""
+    series: list
+    rows: list
+    layers: list
+    view: tuple
+
+    @classmethod
+    def of(cls, study, entry, style, notes):
+        runs = with_result(one_size(chosen(study, entry), entry), notes, completed=not entry.get("unfinished"))
+        series = [(label, run) for label, own in by_series(runs, entry, style).items() for run in own]
+        wanted = entry.get("snapshot", -1)
+        wanted = wanted if isinstance(wanted, list) else [wanted]
+        rows = [[(label, run, snapshot_of(run, index)) for label, run in series] for index in wanted]
+        layers = [Layer("", [[stripes(s, entry) for _, _, s in row] for row in rows])] if entry.get("deformed_grid", False) else \
+            field_layers(rows, entry)
+        return cls(series, rows, layers, _view([s for row in rows for _, _, s in row]))
+
+    @property
+    def snapshots(self):
+        return [s for row in self.rows for _, _, s in row]
+
+    def row(self, number):
+        """The same, of one row alone, on the scales of all."""
+        layers = [replace(layer, data=[layer.data[number]]) for layer in self.layers]
+        return replace(self, rows=[self.rows[number]], layers=layers)
+
+    def draw(self, entry):
+        """The figure of all panels; with `tell_time` it says when, as a picture without a caption must."""
+        extent = self.view[1] - self.view[0]
+        layout = _layout(entry, [label for label, _ in self.series], len(self.rows), len(self.layers), extent[1] / extent[0])
+        figure = plt.figure(figsize=(layout.width, layout.height))
+        for number, layer in enumerate(self.layers):
+            _draw_layer(figure, layout, number * layout.bands * len(self.rows), layer, self.rows, self.view, entry)
+        if entry.get("tell_time") and len(self.rows) == 1:
+            figure.text(0.01, 0.995, where_of_title(self.snapshots).removeprefix("At "), va="top", fontsize=8)
+        return figure
+
+
 def _notes(entry, snapshots):
     notes = []
     if not entry.get("deformed_grid", False) and "range" not in entry:
         notes.append("Colours span the 1st to 99th percentile")
     if entry.get("curves"):
         notes.append(f"Broken lines: reference {', '.join(entry['curves'])}".replace("_", " "))
-    if any(_inclusions(s, entry).any() for s in snapshots):
+    if any(inclusions(s, entry).any() for s in snapshots):
         notes.append("Other bodies than the first are grey")
     return notes
 
@@ -313,21 +258,8 @@ def _check_keys(reader, entry, index):
 def field_maps(study, entry, style):
     """Panels: variants across, snapshots down; errors, where there are any, below the values."""
     notes = []
-    runs = with_result(one_size(chosen(study, entry), entry), notes, completed=not entry.get("unfinished"))
-    series = [(label, run) for label, own in by_series(runs, entry, style).items() for run in own]
-    wanted = entry.get("snapshot", -1)
-    wanted = wanted if isinstance(wanted, list) else [wanted]
-    rows = [[(label, run, snapshot_of(run, index)) for label, run in series] for index in wanted]
-    snapshots = [s for row in rows for _, _, s in row]
-    layers = [Layer("", [[_stripes(s, entry) for _, _, s in row] for row in rows])] if entry.get("deformed_grid", False) else \
-        _field_layers(rows, entry)
-    view = _view(snapshots)
-    extent = view[1] - view[0]
-    layout = _layout(entry, [label for label, _ in series], len(rows), len(layers), extent[1] / extent[0])
-    figure = plt.figure(figsize=(layout.width, layout.height))
-    for number, layer in enumerate(layers):
-        _draw_layer(figure, layout, number * layout.bands * len(rows), layer, rows, view, entry)
-    if len(rows) == 1:
-        notes.insert(0, where_of_title(snapshots))
-    notes += _notes(entry, snapshots)
-    return Drawing(figure, [run for _, run in series], [n for n in dict.fromkeys(notes) if n])
+    maps = Maps.of(study, entry, style, notes)
+    if len(maps.rows) == 1:
+        notes.insert(0, where_of_title(maps.snapshots))
+    notes += _notes(entry, maps.snapshots)
+    return Drawing(maps.draw(entry), [run for _, run in maps.series], [n for n in dict.fromkeys(notes) if n])

@@ -123,7 +123,7 @@ def profile(study, entry, style):
         raise FigureError("'along' must be 'x' or 'y'")
     if split_by not in PANELS:
         raise FigureError("'panels' must be 'variant', 'L' or 'none'")
-    runs = with_result(one_size(chosen(study, entry), entry), notes)
+    runs = with_result(one_size(chosen(study, entry), entry), notes, completed=not entry.get("unfinished"))
     lines, snapshots = _collect(runs, entry, style)
     field_name = components.split(component)[0]
     unit, factor = axis_scale([line.value for line in lines], snapshots[0].unit(field_name) or components.default_unit(field_name))

@@ -113,7 +113,7 @@ def write_atomically(path, text):
     os.replace(part, path)
 
 
-def read_run(folder, entry):
+def read_run(folder, entry, file="result.h5"):
     """A run from its folder; never raises for a bad file, but says so in `reason`."""
     folder = Path(folder)
     values = {**entry.get("axes", {}), "repeat": entry.get("repeat", 1)}
@@ -122,7 +122,7 @@ def read_run(folder, entry):
             values[key] = entry[key]
     run = Run(entry["id"], folder, values, "missing", entry.get("outcome", "") or "not run yet", command=entry.get("command", ""),
               search=entry.get("search", ""))
-    path = folder / "result.h5"
+    path = folder / file
     if not path.is_file():
         return run
     try:

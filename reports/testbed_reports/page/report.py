@@ -13,6 +13,7 @@ from ..draw.figures import draw
 from ..draw.style import RC, WIDTH, Style, plt
 from ..draw.table import Table, as_csv, as_latex
 from ..grade.dataset import read_study_folder, write_atomically
+from ..grade.loose import study_of
 from ..grade.targets import judge_all
 from ..read.results import ResultError
 from ..read.study_file import StudyError
@@ -26,9 +27,6 @@ def find_studies(folders):
     """Folders of studies: those given, or those inside a given one."""
     found = []
     for folder in map(Path, folders):
-        if folder.is_file():
-            raise StudyError(f"{folder}: is a file; a report takes the folder of a study, which `testbed study STUDY.toml -o DIR` "
-                             "makes of its runs. One result opens in ParaView by its .xdmf")
         if not folder.is_dir():
             raise StudyError(f"{folder}: no such folder")
         if (folder / "study.toml").is_file():
@@ -201,6 +199,10 @@ def build(folders, out, command, unreadable=None):
     out = Path(out)
     studies, failures = [], []
     unreadable = [] if unreadable is None else unreadable
+    files = [folder for folder in map(Path, folders) if folder.is_file()]
+    folders = [folder for folder in folders if Path(folder) not in files]
+    if files:
+        studies.append(study_of(files))
     for folder in find_studies(folders):
         try:
             studies.append(read_study_folder(folder))
@@ -247,8 +249,8 @@ def build(folders, out, command, unreadable=None):
 def main(arguments=None):
     """Entry of `testbed report`; returns the exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    parser = argparse.ArgumentParser(prog="testbed report", description="Page, figures and tables of studies.")
-    parser.add_argument("folders", nargs="+", metavar="DIR", help="a study's folder, or a folder of such")
+    parser = argparse.ArgumentParser(prog="testbed report", description="Page, figures and tables of studies, or of results.")
+    parser.add_argument("folders", nargs="+", metavar="DIR", help="a study's folder, a folder of such, or a result file")
     parser.add_argument("-o", "--output", metavar="OUT", help="default: 'report' beside the first DIR")
     try:
         options = parser.parse_args(arguments)
