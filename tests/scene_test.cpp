@@ -225,6 +225,18 @@ TEST(Scene, WarnsOfLocking)
     EXPECT_TRUE(warnings("mpm-linear-bbar", {"material.soil.poissons_ratio=0.49"}).empty());
 }
 
+TEST(Scene, WarnsOfAConstantThatNothingUses)
+{
+    const auto warnings = [](const std::string& constants)
+    {
+        const test::SceneFile file(replaced(minimal, "H = 4.0", constants));
+        return load_scene(file.path(), "lpfdm").warnings;
+    };
+    EXPECT_TRUE(warnings("H = \"a+2\"\na = 2").empty());
+    ASSERT_EQ(warnings("H = 4.0\nHH = 2").size(), 1u);
+    EXPECT_NE(warnings("H = 4.0\nHH = 2")[0].find("constants.HH"), std::string::npos);
+}
+
 TEST(Scene, WarnsOfStressThatGravityDoesNotCarryYet)
 {
     const std::string text =

@@ -46,8 +46,9 @@ std::filesystem::path own_directory()
     if (std::filesystem::exists(beside))
         ::execv(beside.c_str(), argv.data());
     ::execvp(program.c_str(), argv.data());
-    throw SceneError(fmt::format("'{}' is not built or not installed ({}); the FEM reference needs deal.II, study, report and plot need Python",
-                                 program, std::strerror(errno)));
+    throw SceneError(
+        fmt::format("'{}' is not built or not installed ({}); the FEM reference needs deal.II, study, report and plot need Python", program,
+                    std::strerror(errno)));
 }
 
 std::string fields_and_modules(const Scene& scene, Solver& solver)

@@ -2,9 +2,11 @@
 
 #include "core/scene/reader.hpp"
 
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <set>
 
 namespace testbed
 {
@@ -122,6 +124,37 @@ void set_override(toml::table& root, const std::string& assignment, Problems& pr
             table = next->as_table();
         }
     }
+}
+/// The words of all texts, in which constants may stand.
+void collect_words(const toml::node& node, std::set<std::string, std::less<>>& words)
+{
+    const auto is_of_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+    if (const toml::table* table = node.as_table())
+        for (const auto& [key, value] : *table)
+            collect_words(value, words);
+    else if (const toml::array* array = node.as_array())
+        for (const toml::node& value : *array)
+            collect_words(value, words);
+    else if (const auto* text = node.as_string())
+        for (auto begin = (*text)->begin(), end = begin; begin != (*text)->end(); begin = end)
+        {
+            begin = std::find_if(begin, (*text)->end(), is_of_word);
+            end = std::find_if_not(begin, (*text)->end(), is_of_word);
+            words.emplace(begin, end);
+        }
+}
+
+/// Most often a typing error in the expression that was to use it.
+void warn_of_unused_constants(const toml::table& root, Problems& problems)
+{
+    const toml::table* constants = root["constants"].as_table();
+    if (!constants)
+        return;
+    std::set<std::string, std::less<>> words;
+    collect_words(root, words);
+    for (const auto& [name, value] : *constants)
+        if (!words.contains(name.str()))
+            problems.warn("constants." + std::string(name.str()), "no expression uses it");
 }
 }  // namespace
 
@@ -277,6 +310,7 @@ LoadedScene load_scene_text(const std::string& text, const std::string& path, co
         if (!body.inside.empty())
             body.points_per_cell = scene.body(body.inside).points_per_cell;
     check_limits(scene, problems);
+    warn_of_unused_constants(root, problems);
     throw_if_any();
     loaded.warnings = problems.warnings();
     return loaded;
