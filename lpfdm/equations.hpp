@@ -2,6 +2,7 @@
 /// One step of LPFDM, a function for each group of equations of Konagai & Johansson (2000).
 
 #include "core/bodies/bin_sums.hpp"
+#include "core/bodies/stress_runs.hpp"
 #include "lpfdm/grid.hpp"
 
 namespace testbed
@@ -282,28 +283,31 @@ private:
 
 /// Strain and rotation (5e), (5f), stress, volume, and position by eq. (6), for the points of one body; and, while they are at hand, the
 /// sums of its bins (`sums`, from the body's first on) for the next step. Marks bins that a point left: their sums are then not right.
-template <class Support, class Law>
-void move_points(const LpfdmGrid<2>& grid, const MidSteps& mid_steps, Body& body, const Law& law, const StrainIncrement& increment,
-                 double dt, double* sums)
+template <class Support>
+void move_points(const LpfdmGrid<2>& grid, const MidSteps& mid_steps, Body& body, const StrainIncrement& increment, double dt, double* sums)
 {
     Points<2>& q = body.points;
     const auto& bins = body.bins.list();
-    parallel_for(bins.size(),
-                 [&](std::size_t b) TESTBED_FLATTEN
-                 {
-                     const BinMotion<Support> motion(grid, bins[b], mid_steps);
-                     const BinFrame<2> frame(grid.lattice, bins[b], motion.origin());
-                     for_each_pack(bins[b].begin, bins[b].end,
-                                   [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                                   {
-                                       Vec<2, Pack> x = load(q.x, p, lanes);
-                                       const Gradient<2, Pack> g = motion(frame.template box<Support>(q, p, lanes, x), dt, x);
-                                       law.update(q, p, lanes, g);
-                                       stretch<Support>(q, p, lanes, increment, g);
-                                       store(q.x, p, lanes, x);
-                                   });
-                     if (sum_bin<Support, CellSums<Support>>(grid.lattice, body, bins[b], sums + b * CellSums<Support>::numbers))
-                         body.bins.mark(b);
-                 });
+    update_stress(
+        body,
+        [&](std::size_t b, auto&& keep) TESTBED_INLINE
+        {
+            const BinMotion<Support> motion(grid, bins[b], mid_steps);
+            const BinFrame<2> frame(grid.lattice, bins[b], motion.origin());
+            for_each_pack(bins[b].begin, bins[b].end,
+                          [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                          {
+                              Vec<2, Pack> x = load(q.x, p, lanes);
+                              const Gradient<2, Pack> g = motion(frame.template box<Support>(q, p, lanes, x), dt, x);
+                              keep(p, lanes, g);
+                              stretch<Support>(q, p, lanes, increment, g);
+                              store(q.x, p, lanes, x);
+                          });
+        },
+        [&](std::size_t b) TESTBED_INLINE
+        {
+            if (sum_bin<Support, CellSums<Support>>(grid.lattice, body, bins[b], sums + b * CellSums<Support>::numbers))
+                body.bins.mark(b);
+        });
 }
 }  // namespace testbed

@@ -220,13 +220,8 @@ private:
 
     void move_all_points(double dt)
     {
-        std::size_t first_bin = 0;
-        for (Body& body : bodies_)
-        {
-            std::visit([&](const auto& law) { move_points<Support>(grid_, mid_steps_, body, law, increment_, dt, sums_.of(first_bin)); },
-                       body.material);
-            first_bin += body.bins.list().size();
-        }
+        cloud_.for_each_body([&](Body& body, std::size_t first_bin)
+                             { move_points<Support>(grid_, mid_steps_, body, increment_, dt, sums_.of(first_bin)); });
     }
 
     double hourglass_rate() const { return options_.hourglass * wave_speed_ / grid_.lattice.cell_size; }

@@ -3,6 +3,7 @@
 
 #include "core/bodies/bin_sums.hpp"
 #include "core/bodies/cloud.hpp"
+#include "core/bodies/stress_runs.hpp"
 #include "mpm/grid.hpp"
 #include "mpm/xpic.hpp"
 
@@ -58,56 +59,23 @@ void smooth(Cloud<Shape>& cloud, MpmGrid<Shape>& grid, VectorField<2>& field)
 template <class Strain, class Shape>
 void update_stress(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIncrement& increment, double dt)
 {
-    cloud.for_each_bin_with_law(grid.lattice,
-                                [&](Body& body, const auto& law, const Bin<2>& bin, std::size_t, const BinFrame<2>& frame)
-                                {
-                                    Points<2>& q = body.points;
-                                    const typename Strain::template InBin<Shape> strain(grid.lattice, q, bin);
-                                    const NodalVelocity<Shape::S> v(grid.lattice, bin, grid.nodes.v);
-                                    for_each_pack(bin.begin, bin.end,
-                                                  [&](std::size_t p, const auto& lanes)
-                                                  {
-                                                      const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                                                      law.update(q, p, lanes, increment.of(v.template gradient<Strain>(at, strain, dt)));
-                                                  });
-                                });
-}
-
-/// Position with the carrier velocity; volume or box with the nodal velocity. If the stress is not updated first: stress, too, and the
-/// sums of the bins for the next step.
-/// @param sums of the bins, numbers for each, or null if the stress came first
-template <class Strain, bool with_stress, class Shape>
-void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIncrement& increment, const VectorField<2>& carrier_velocity,
-                 double dt, double* sums)
-{
-    using Sums = NodeSums<Shape, Strain, Scatter::momentum_and_force>;
-    cloud.for_each_bin_with_law(
-        grid.lattice,
-        [&](Body& body, const auto& law, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_FLATTEN
+    cloud.for_each_body(
+        [&](Body& body, std::size_t)
         {
-            Points<2>& q = body.points;
-            const typename Strain::template InBin<Shape> strain(grid.lattice, q, bin);
-            const NodalVelocity<Shape::S> carrier(grid.lattice, bin, carrier_velocity), v(grid.lattice, bin, grid.nodes.v);
-            bool left = false;
-            for_each_pack(bin.begin, bin.end,
-                          [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                          {
-                              const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                              const Gradient<2, Pack> d = increment.of(v.template gradient<Strain>(at, strain, dt));
-                              if constexpr (with_stress)
-                                  law.update(q, p, lanes, d);
-                              stretch<Shape>(q, p, lanes, increment, d);
-                              Vec<2, Pack> x = carrier.at(at);
-                              unrolled<2>([&](auto i) TESTBED_INLINE { x[i] = lanes.load(&q.x[i][p]) + x[i] * Pack(dt); });
-                              store(q.x, p, lanes, x);
-                              if constexpr (!with_stress)
-                                  left |=
-                                      stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x)));
-                          });
-            if constexpr (with_stress)
-                left |= sum_bin<Shape, Sums>(grid.lattice, body, bin, sums + number * Sums::numbers);
-            if (left)
-                body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
+            const auto strain = [&](std::size_t b, auto&& keep) TESTBED_INLINE
+            {
+                const Bin<2>& bin = body.bins.list()[b];
+                const BinFrame<2> frame(grid.lattice, bin);
+                const typename Strain::template InBin<Shape> strain_in(grid.lattice, body.points, bin);
+                const NodalVelocity<Shape::S> v(grid.lattice, bin, grid.nodes.v);
+                for_each_pack(bin.begin, bin.end,
+                              [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                              {
+                                  const ShapeAt<Shape> at(frame.template corner<Shape>(body.points, p, lanes), frame.scale);
+                                  keep(p, lanes, increment.of(v.template gradient<Strain>(at, strain_in, dt)));
+                              });
+            };
+            testbed::update_stress(body, strain, [](std::size_t) {});
         });
 }
 
@@ -120,5 +88,54 @@ bool any_left(const Points<2>& q, const Bin<2>& bin, const BinFrame<2>& frame)
                   [&](std::size_t p, const auto& lanes)
                   { left |= stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes))); });
     return left;
+}
+
+/// Position with the carrier velocity; volume or box with the nodal velocity. If the stress is not updated first: stress, too, and the
+/// sums of the bins for the next step.
+/// @param sums of the bins, numbers for each, or null if the stress came first
+template <class Strain, bool with_stress, class Shape>
+void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIncrement& increment, const VectorField<2>& carrier_velocity,
+                 double dt, double* sums)
+{
+    using Sums = NodeSums<Shape, Strain, Scatter::momentum_and_force>;
+    const auto move = [&](Body& body, const Bin<2>& bin, auto&& keep) TESTBED_INLINE
+    {
+        Points<2>& q = body.points;
+        const BinFrame<2> frame(grid.lattice, bin);
+        const typename Strain::template InBin<Shape> strain(grid.lattice, q, bin);
+        const NodalVelocity<Shape::S> carrier(grid.lattice, bin, carrier_velocity), v(grid.lattice, bin, grid.nodes.v);
+        for_each_pack(bin.begin, bin.end,
+                      [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                      {
+                          const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
+                          const Gradient<2, Pack> d = increment.of(v.template gradient<Strain>(at, strain, dt));
+                          keep(p, lanes, d);
+                          stretch<Shape>(q, p, lanes, increment, d);
+                          Vec<2, Pack> x = carrier.at(at);
+                          unrolled<2>([&](auto i) TESTBED_INLINE { x[i] = lanes.load(&q.x[i][p]) + x[i] * Pack(dt); });
+                          store(q.x, p, lanes, x);
+                      });
+    };
+    if constexpr (with_stress)
+        cloud.for_each_body(
+            [&](Body& body, std::size_t first_bin)
+            {
+                const auto& bins = body.bins.list();
+                testbed::update_stress(
+                    body, [&](std::size_t b, auto&& keep) TESTBED_INLINE { move(body, bins[b], keep); },
+                    [&](std::size_t b) TESTBED_INLINE
+                    {
+                        if (sum_bin<Shape, Sums>(grid.lattice, body, bins[b], sums + (first_bin + b) * Sums::numbers))
+                            body.bins.mark(b);
+                    });
+            });
+    else
+        cloud.for_each_bin(grid.lattice,
+                           [&](Body& body, const Bin<2>& bin, std::size_t, const BinFrame<2>& frame) TESTBED_FLATTEN
+                           {
+                               move(body, bin, [](std::size_t, const auto&, const Gradient<2, Pack>&) {});
+                               if (any_left<Shape>(body.points, bin, frame))
+                                   body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
+                           });
 }
 }  // namespace testbed

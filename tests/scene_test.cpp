@@ -116,6 +116,14 @@ TEST(Method, RefusesShapesAndStrainsThatDoNotGoTogether)
                              "linear with four_point or b_bar; bspline with four_point; cpgimp with four_point");
 }
 
+/// With stress first, the velocity of a node with next to no mass goes into the strain.
+TEST(Method, UslAloneDividesBySlivers)
+{
+    EXPECT_TRUE(traits_of(test::load(minimal, "mpm-linear", {"mpm.scheme=usl"})).divides_by_slivers);
+    for (const std::string& variant : variant_names())
+        EXPECT_FALSE(traits_of(test::load(minimal, variant, {})).divides_by_slivers) << variant;
+}
+
 /// What helps is a setting that the scene takes, whatever its other options.
 TEST(Method, RemediesAreAccepted)
 {

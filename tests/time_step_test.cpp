@@ -408,6 +408,27 @@ TEST(AutoStep, EndsAtTheEndWhateverTheSteps)
     EXPECT_LT(shortest, 0.8 * 0.5 * std::sqrt(0.7));
 }
 
+/// A run that goes on with its own, shorter step takes as many of these as the new end asks for.
+TEST(StepControl, GoesOnToALaterEndWithTheStepOfTheState)
+{
+    Scene scene = Case{"lpfdm"}.scene();
+    const auto solver = make(scene);
+    const double limit = scene.time.cfl * solver->critical_time_step(scene);
+    scene.time.end = 1.5 * limit;
+    StepControl first(scene, *solver);
+    ASSERT_DOUBLE_EQ(first.dt(), 0.75 * limit);
+    State state;
+    StateWriter writer(state);
+    first.state(writer);
+    scene.time.end = 15 * limit;
+    StepControl second(scene, *solver);
+    StateReader reader(state);
+    second.state(reader);
+    while (!second.is_at_end())
+        second.next();
+    EXPECT_NEAR(second.t(), 15 * limit, 1e-9 * limit);
+}
+
 /// With a limit that does not change the steps are those of a fixed cfl, bit for bit up to the sum of times.
 TEST(AutoStep, FollowsTheLimitAndEndsAtTheEnd)
 {

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace testbed
@@ -83,13 +84,22 @@ public:
                      });
     }
 
-    /// Value `k` from place `begin` on becomes that of place order[k], by way of `workspace`, too.
-    void reorder(std::span<const std::uint32_t> order, std::size_t begin, double* workspace)
+    /// Value `k` from place `begin` on becomes that of place order[k], by way of `workspace`, too, or in its place if it is as long as the
+    /// field and most values move.
+    void reorder(std::span<const std::uint32_t> order, std::size_t begin, std::vector<double>& workspace)
     {
         parallel_for(
-            order.size(), [&](std::size_t k) { workspace[k] = static_cast<double>(data_[order[k]]); }, 4096);
+            order.size(), [&](std::size_t k) { workspace[begin + k] = static_cast<double>(data_[order[k]]); }, 4096);
+        if constexpr (std::is_same_v<T, double>)
+            if (workspace.size() == data_.size() && order.size() > data_.size() / 2)
+            {
+                const auto end = static_cast<std::ptrdiff_t>(begin + order.size());
+                std::copy_n(data_.begin(), begin, workspace.begin());
+                std::copy(data_.begin() + end, data_.end(), workspace.begin() + end);
+                return data_.swap(workspace);
+            }
         parallel_for(
-            order.size(), [&](std::size_t k) { data_[begin + k] = static_cast<T>(workspace[k]); }, 4096);
+            order.size(), [&](std::size_t k) { data_[begin + k] = static_cast<T>(workspace[begin + k]); }, 4096);
     }
 
 private:

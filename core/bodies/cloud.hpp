@@ -59,34 +59,27 @@ public:
         return density * cell_size * cell_size;
     }
 
+    /// f(body, number of its first bin among all) for every body.
+    template <class F>
+    void for_each_body(F&& f)
+    {
+        std::size_t first_bin = 0;
+        for (Body& body : bodies)
+        {
+            f(body, first_bin);
+            first_bin += body.bins.list().size();
+        }
+    }
     /// kernel(body, bin, number of the bin among all, frame) for every bin of every body.
     template <class Kernel>
     void for_each_bin(const Lattice<2>& lattice, Kernel&& kernel)
     {
-        std::size_t first_bin = 0;
-        for (Body& body : bodies)
-        {
-            for_each_bin_of(lattice, body, first_bin, kernel);
-            first_bin += body.bins.list().size();
-        }
-    }
-    /// The same with the law of the body: kernel(body, law, bin, number, frame).
-    template <class Kernel>
-    void for_each_bin_with_law(const Lattice<2>& lattice, Kernel&& kernel)
-    {
-        std::size_t first_bin = 0;
-        for (Body& body : bodies)
-        {
-            std::visit(
-                [&](const auto& law)
-                {
-                    for_each_bin_of(lattice, body, first_bin,
-                                    [&](Body& b, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_INLINE
-                                    { kernel(b, law, bin, number, frame); });
-                },
-                body.material);
-            first_bin += body.bins.list().size();
-        }
+        for_each_body(
+            [&](Body& body, std::size_t first_bin)
+            {
+                const auto& bins = body.bins.list();
+                parallel_for(bins.size(), [&](std::size_t b) { kernel(body, bins[b], first_bin + b, BinFrame(lattice, bins[b])); });
+            });
     }
 
     template <class Archive>
@@ -100,13 +93,5 @@ public:
     std::vector<Body> bodies;
     std::vector<double> workspace;           ///< the way of a field to its new order, and sums of bins on their way to nodes
     std::optional<NonlocalStrain> nonlocal;  ///< if a law softens by it
-
-private:
-    template <class Kernel>
-    void for_each_bin_of(const Lattice<2>& lattice, Body& body, std::size_t first_bin, Kernel&& kernel)
-    {
-        const auto& bins = body.bins.list();
-        parallel_for(bins.size(), [&](std::size_t b) { kernel(body, bins[b], first_bin + b, BinFrame(lattice, bins[b])); });
-    }
 };
 }  // namespace testbed

@@ -8,7 +8,7 @@ template <int dim>
 void Bins<dim>::reorder(Points<dim>& points, std::vector<double>& workspace)
 {
     constexpr std::uint32_t short_block = 8;
-    make_room(workspace, points.count);
+    make_room(workspace, points.count + pack_size);
     std::uint32_t begin = none, end = 0, moved = 0;
     for (const Move& move : moves_)
     {
@@ -22,7 +22,7 @@ void Bins<dim>::reorder(Points<dim>& points, std::vector<double>& workspace)
     std::iota(order.begin(), order.end(), begin);
     for (const Move& move : moves_)
         std::iota(&order[move.to - begin], &order[move.to - begin] + move.count, move.from);
-    points.for_each_field([&](auto& field) { field.reorder(order, begin, workspace.data()); });
+    points.for_each_field([&](auto& field) { field.reorder(order, begin, workspace); });
 }
 
 template <int dim>

@@ -97,7 +97,7 @@ template <class Rotation>
 struct Hypoelastic : ElasticPart
 {
     static constexpr const char* name = Rotation::law;
-    static constexpr bool has_strength = false;
+    static constexpr bool has_strength = false, is_cheap = true;
     using Keys = NoKeys;
     using Forms = std::variant<Hypoelastic, VaryingStiffness<Hypoelastic>>;
     static Forms make(const Keys&, const LawInput& input);
@@ -156,6 +156,7 @@ protected:
 template <class Law>
 struct VaryingStiffness : Law
 {
+    static constexpr bool is_cheap = false;
     using Law::update;
 
     void allocate(Points<2>& q) const { q.stiffness.activate(q.count); }

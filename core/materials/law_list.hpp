@@ -25,6 +25,9 @@ concept MaterialLaw = requires(const Law law, typename Law::template State<doubl
         Law::kinematics
         } -> std::convertible_to<Kinematics>;
     {
+        Law::is_cheap  // beside moving a point: it is then updated in the same pass
+        } -> std::convertible_to<bool>;
+    {
         law.wave_speed(points)
         } -> std::same_as<double>;
     {

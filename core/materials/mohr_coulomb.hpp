@@ -20,7 +20,7 @@ struct MohrCoulombField;
 struct MohrCoulomb : ElasticPart
 {
     static constexpr const char* name = "mohr_coulomb";
-    static constexpr bool has_strength = true;
+    static constexpr bool has_strength = true, is_cheap = false;
     using Keys = StrengthKeys;
     using Forms = std::variant<MohrCoulomb, MohrCoulombField<true, false>, MohrCoulombField<false, true>, MohrCoulombField<true, true>>;
     /// @param keys has a strength
