@@ -1,7 +1,11 @@
+#include "core/bodies/stress_runs.hpp"
+#include "core/bodies/support.hpp"
 #include "core/materials/material.hpp"
 #include "core/materials/material_spec.hpp"
 #include "tests/random.hpp"
+#include "tests/scenes.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 using namespace testbed;
@@ -163,4 +167,82 @@ TEST(MakeMaterial, StrengthAndSofteningOfAScene)
     EXPECT_NEAR(law.softening.share(0.02), 0.7, 1e-12);
     EXPECT_NEAR(law.softening.share(0.04), 0.4, 1e-12);
     EXPECT_NEAR(law.softening.share(0.08), 0.4, 1e-12);
+}
+
+/// The law goes over the points of several bins, or of one larger than a run, in whole packs: each gets its own increment, once, and a bin
+/// is finished after that.
+TEST(StressRuns, GiveEachPointItsOwnIncrement)
+{
+    for (const int points_per_cell : {1, 2, 3, 12})
+        for (const char* law : {"linear_elastic", "mohr_coulomb"})
+        {
+            const std::string strength =
+                std::string(law) == "mohr_coulomb" ? "[material.strength]\ncohesion = 1e3\nfriction_angle = 0.5\n" : "";
+            const Scene scene = test::load(fmt::format(R"toml(
+[grid]
+size = [8.0, 3.0]
+cell_size = 0.5
+[time]
+end = 1.0
+[[material]]
+name = "soil"
+law = "{}"
+density = 1000.0
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+{}
+[[body]]
+name = "block"
+material = "soil"
+shape = "box"
+min = [0.0, 0.0]
+max = [7.5, 2.5]
+points_per_cell = {}
+)toml",
+                                                       law, strength, points_per_cell));
+            std::vector<Body> bodies = make_bodies(scene, make_lattice(scene.grid), {});
+            Body& body = bodies[0];
+            std::vector<double> workspace;
+            body.bins.rebuild<PointSupport>(body.points, workspace);
+            Points<2>& q = body.points;
+            std::vector<Gradient<2>> d(q.count);
+            test::Random random(5);
+            for (auto& g : d)
+                g = {random(-2e-3, 2e-3), random(-2e-3, 2e-3), random(-2e-3, 2e-3), random(-2e-3, 2e-3)};
+            std::vector<int> finished(body.bins.list().size());
+            update_stress(
+                body,
+                [&](std::size_t b, auto&& keep)
+                {
+                    for_each_pack(body.bins.list()[b].begin, body.bins.list()[b].end,
+                                  [&](std::size_t p, const auto& lanes)
+                                  {
+                                      std::array<std::array<double, pack_size>, 4> own{};
+                                      for (std::size_t k = 0; k < pack_size && p + k < q.count; ++k)
+                                          own[0][k] = d[p + k].xx, own[1][k] = d[p + k].yy, own[2][k] = d[p + k].xy,
+                                          own[3][k] = d[p + k].yx;
+                                      const auto pack = [&](std::size_t i) { return lanes.load(own[i].data()); };
+                                      keep(p, lanes, Gradient<2, Pack>{pack(0), pack(1), pack(2), pack(3)});
+                                  });
+                },
+                [&](std::size_t b)
+                {
+                    ++finished[b];
+                    EXPECT_NE(q.stress[0][body.bins.list()[b].begin], 0);
+                });
+            EXPECT_EQ(finished, std::vector<int>(finished.size(), 1));
+            std::visit(
+                [&](const auto& own)
+                {
+                    for (std::size_t p = 0; p < q.count; ++p)
+                    {
+                        typename std::decay_t<decltype(own)>::template State<double> state{};
+                        own.update(state, d[p]);
+                        EXPECT_NEAR(q.stress[0][p], state.stress.xx, 1e-8) << law << " " << points_per_cell;
+                        EXPECT_NEAR(q.stress[1][p], state.stress.yy, 1e-8);
+                        EXPECT_NEAR(q.stress[2][p], state.stress.xy, 1e-8);
+                    }
+                },
+                body.material);
+        }
 }
