@@ -140,10 +140,20 @@ def test_command_on_damaged_files(tmp_path):
         assert done.stderr.startswith("testbed report: "), what
 
 
-def test_report_of_a_result_file_says_what_to_give(tmp_path, capsys):
-    path = write_result(tmp_path / "result.h5")
-    assert report([str(path)]) == 1
-    assert "takes the folder of a study" in capsys.readouterr().err
+@pytest.mark.parametrize("command", ["report", "plot"])
+def test_commands_on_a_damaged_result_file(tmp_path, command):
+    path = write_result(tmp_path / "a.h5")
+    program, out = COMMAND.with_name(f"testbed-{command}"), tmp_path / ("out" if command == "report" else "out.png")
+    ask = [sys.executable, program, path, "-o", out]
+    assert subprocess.run(ask, capture_output=True, timeout=300).returncode == 0
+    declared(path)
+    whole = path.with_name("whole")
+    path.rename(whole)
+    for what, data in damaged_copies(whole, max(4, COUNT // 100), seed=4):
+        path.write_bytes(data)
+        done = subprocess.run(ask, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 1 and "Traceback" not in done.stderr, (what, done.stderr)
+        assert done.stderr.startswith(f"testbed {command}: "), (what, done.stderr)
 
 
 @pytest.mark.parametrize("plan", ["[1]", "{\"runs\": [1]}", "{\"runs\": [{\"id\": 3}]}", "{\"runs\": 3}", "{", "[" * 100000])
