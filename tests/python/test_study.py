@@ -177,7 +177,7 @@ def test_combinations_that_mean_one_scene_are_refused(bench):
     (bench.folder / "twin.toml").write_text((bench.folder / "scene.toml").read_text())
     bench.write(STUDY.replace('scene = "scene.toml"\n', "").replace("[axes]", '[axes]\nscene = ["scene.toml", "twin.toml"]'))
     done = bench.run()
-    assert done.returncode == 1 and "the same scene" in done.stderr and "scene = twin.toml" in done.stderr and not bench.calls
+    assert done.returncode == 1 and "the same scene" in done.stderr and "scene.toml and twin.toml" in done.stderr and not bench.calls
 
 
 def test_scenes_of_one_folder_are_cases_of_their_own(bench):

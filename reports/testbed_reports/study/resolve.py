@@ -3,7 +3,7 @@ import shlex
 import subprocess
 import tomllib
 
-from ..read.study_file import StudyError, toml_value
+from ..read.study_file import StudyError, same, toml_value
 
 
 def run_arguments(combination):
@@ -35,14 +35,21 @@ def refusals(refused):
 
 
 def refuse_twins(study, chosen, scenes):
-    """Two combinations of a case that mean the same scene would stand side by side as if they differed."""
-    seen = {}
+    """Values of axes that never make another scene would stand side by side as if they differed. That two scenes meet somewhere is lawful."""
+    seen, texts, twins = {}, {}, []
     for (combination, method), (text, _) in zip(chosen, scenes):
+        texts[combination.case, repr(combination.axes)] = (combination.axes, text)
         key = (combination.case, method, combination.threads, text)
         if key in seen:
-            first, second = (", ".join(f"{k} = {v}" for k, v in c.axes.items()) for c in (seen[key], combination))
-            raise StudyError(f"{study.path}: two combinations are the same scene, an axis has no effect: {first}; and {second}")
-        seen[key] = combination
+            twins.append((seen[key], combination))
+        seen.setdefault(key, combination)
+    for first, second in twins:
+        change = {k: v for k, v in second.axes.items() if not same(v, first.axes.get(k))}
+        pairs = ((text, texts.get((case, repr({**axes, **change})), (axes, text))[1]) for (case, _), (axes, text) in texts.items()
+                 if case == first.case and all(same(axes.get(k), first.axes.get(k)) for k in change))
+        if all(other == text for text, other in pairs):
+            told = ", ".join(f"{k} = {first.axes.get(k)} and {v}" for k, v in change.items())
+            raise StudyError(f"{study.path}: {told} are the same scene: an axis has no effect")
 
 
 def resolve(testbed, combination):
