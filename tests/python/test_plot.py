@@ -1,5 +1,8 @@
 """`testbed plot` on synthetic results."""
+import os
+import shutil
 import subprocess
+import sys
 
 import pytest
 from conftest import REPORTS
@@ -40,6 +43,19 @@ def test_animation(results, tmp_path):
     done = plot(*results, "-o", tmp_path / "a.gif", "--seconds", "1")
     assert done.returncode == 0, done.stderr
     assert Image.open(tmp_path / "a.gif").n_frames > 1
+
+
+@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="ffmpeg is not installed")
+def test_animation_as_mp4(results, tmp_path):
+    done = plot(*results, "-o", tmp_path / "a.mp4", "--seconds", "1")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_an_mp4_without_ffmpeg_says_what_lacks(results, tmp_path):
+    done = subprocess.run([sys.executable, str(REPORTS / "testbed-plot"), str(results[0]), "-o", str(tmp_path / "a.mp4")], capture_output=True,
+                          text=True, env={**os.environ, "PATH": str(tmp_path)})
+    assert done.returncode == 1 and "needs ffmpeg" in done.stderr
 
 
 @pytest.mark.parametrize("arguments, told", [

@@ -28,9 +28,9 @@ def refusals(refused):
     """One message for all combinations that are refused with the same words."""
     texts = []
     for key in dict.fromkeys((r.scene, r.told) for r in refused):
-        same = [r for r in refused if (r.scene, r.told) == key]
-        more = f" and {len(same) - 1} more combinations" if len(same) > 1 else ""
-        texts.append(f"{key[0]}: refused by 'testbed check' ({same[0].arguments}){more}:\n{key[1]}")
+        alike = [r for r in refused if (r.scene, r.told) == key]
+        more = f" and {len(alike) - 1} more combinations" if len(alike) > 1 else ""
+        texts.append(f"{key[0]}: refused by 'testbed check' ({alike[0].arguments}){more}:\n{key[1]}")
     return "\n".join(texts)
 
 
