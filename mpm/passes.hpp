@@ -104,6 +104,7 @@ void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIn
         const BinFrame<2> frame(grid.lattice, bin);
         const typename Strain::template InBin<Shape> strain(grid.lattice, q, bin);
         const NodalVelocity<Shape::S> carrier(grid.lattice, bin, carrier_velocity), v(grid.lattice, bin, grid.nodes.v);
+        bool left = false;
         for_each_pack(bin.begin, bin.end,
                       [&](std::size_t p, const auto& lanes) TESTBED_INLINE
                       {
@@ -114,7 +115,10 @@ void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIn
                           Vec<2, Pack> x = carrier.at(at);
                           unrolled<2>([&](auto i) TESTBED_INLINE { x[i] = lanes.load(&q.x[i][p]) + x[i] * Pack(dt); });
                           store(q.x, p, lanes, x);
+                          if constexpr (!with_stress)  // else the sums of the bin tell
+                              left |= stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x)));
                       });
+        return left;
     };
     if constexpr (with_stress)
         cloud.for_each_body(
@@ -131,10 +135,9 @@ void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIn
             });
     else
         cloud.for_each_bin(grid.lattice,
-                           [&](Body& body, const Bin<2>& bin, std::size_t, const BinFrame<2>& frame) TESTBED_FLATTEN
+                           [&](Body& body, const Bin<2>& bin, std::size_t, const BinFrame<2>&) TESTBED_FLATTEN
                            {
-                               move(body, bin, [](std::size_t, const auto&, const Gradient<2, Pack>&) {});
-                               if (any_left<Shape>(body.points, bin, frame))
+                               if (move(body, bin, [](std::size_t, const auto&, const Gradient<2, Pack>&) {}))
                                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
                            });
 }

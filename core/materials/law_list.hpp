@@ -129,5 +129,4 @@ struct LawList
         return makers.at(static_cast<std::size_t>(law))(keys, input);
     }
 };
-
 }  // namespace testbed
