@@ -180,6 +180,17 @@ def test_combinations_that_mean_one_scene_are_refused(bench):
     assert done.returncode == 1 and "the same scene" in done.stderr and "scene.toml and twin.toml" in done.stderr and not bench.calls
 
 
+def test_a_constant_is_set_in_the_scenes_that_have_it(bench):
+    (bench.folder / "grain.toml").write_text('method = "lpfdm"\n[constants]\ndepth = 1.0\n')
+    study = STUDY.replace('scene = "scene.toml"\n', "").replace("[axes]", '[axes]\nscene = ["scene.toml", "grain.toml"]\n"constants.depth" = [1.0, 2.0]')
+    bench.write(study)
+    refused = bench.run()  # the scene without it would run twice
+    assert refused.returncode == 1 and "constants.depth = 1.0 and 2.0 are the same scene" in refused.stderr and not bench.calls
+    bench.write(study + '[[exclude]]\nscene = "scene.toml"\n"constants.depth" = 2.0\n')
+    assert bench.run("--quiet").returncode == 0
+    assert sorted(call[2].get("constants.depth", "") for call in bench.calls) == [""] * 4 + ["1.0"] * 4 + ["2.0"] * 4
+
+
 def test_scenes_of_one_folder_are_cases_of_their_own(bench):
     (bench.folder / "soft.toml").write_text('method = "lpfdm"\n# soft\n')
     bench.write(STUDY.replace('scene = "scene.toml"\n', "").replace("[axes]", '[axes]\nscene = ["scene.toml", "soft.toml"]'))

@@ -2,8 +2,26 @@
 import shlex
 import subprocess
 import tomllib
+from dataclasses import replace
 
 from ..read.study_file import StudyError, same, toml_value
+
+
+def _constants_of(scene):
+    """Names of the constants of a scene file; what is wrong with it `testbed check` tells."""
+    try:
+        constants = tomllib.loads(scene.read_text(encoding="utf-8")).get("constants", {})
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return set()
+    return {f"constants.{name}" for name in constants} if isinstance(constants, dict) else set()
+
+
+def with_own_constants(combinations, every):
+    """Where scenes are an axis, a constant is set in those that have it. One that no scene of `every` combination has is left to be refused."""
+    known = {scene: _constants_of(scene) for scene in {c.scene for c in every}}
+    anywhere = set().union(*known.values())
+    return [replace(c, sets={k: v for k, v in c.sets.items() if k not in anywhere - known[c.scene]}) if "scene" in c.axes else c
+            for c in combinations]
 
 
 def run_arguments(combination):
@@ -35,7 +53,8 @@ def refusals(refused):
 
 
 def refuse_twins(study, chosen, scenes):
-    """Values of axes that never make another scene would stand side by side as if they differed. That two scenes meet somewhere is lawful."""
+    """Values of axes that never make another scene of a scene file would stand side by side as if they differed. That two meet somewhere is
+    lawful."""
     seen, texts, twins = {}, {}, []
     for (combination, method), (text, _) in zip(chosen, scenes):
         texts[combination.case, repr(combination.axes)] = (combination.axes, text)
@@ -46,7 +65,7 @@ def refuse_twins(study, chosen, scenes):
     for first, second in twins:
         change = {k: v for k, v in second.axes.items() if not same(v, first.axes.get(k))}
         pairs = ((text, texts.get((case, repr({**axes, **change})), (axes, text))[1]) for (case, _), (axes, text) in texts.items()
-                 if case == first.case and all(same(axes.get(k), first.axes.get(k)) for k in change))
+                 if case == first.case and axes.get("scene") == first.axes.get("scene") and all(same(axes.get(k), first.axes.get(k)) for k in change))
         if all(other == text for text, other in pairs):
             told = ", ".join(f"{k} = {first.axes.get(k)} and {v}" for k, v in change.items())
             raise StudyError(f"{study.path}: {told} are the same scene: an axis has no effect")

@@ -17,7 +17,7 @@ from ..grade.metrics_csv import metrics_csv
 from ..grade.targets import as_text, judge_all
 from ..read.results import is_finished, seed_of
 from ..read.study_file import StudyError, read_study, toml_value
-from .resolve import Refused, method_of, refusals, refuse_twins, resolve, run_arguments
+from .resolve import Refused, method_of, refusals, refuse_twins, resolve, run_arguments, with_own_constants
 from .runner import Task, run_all
 from .search import Searches, name_of
 
@@ -101,7 +101,7 @@ def expand(study, combinations, testbed, folder, keep, jobs):
     hashes = {key: digest(data, length=4) for key, data in binaries.items() if data is not None}
 
     chosen, left_out = [], []
-    for combination in combinations:
+    for combination in with_own_constants(combinations, study.combinations):
         method = combination.method or method_of(combination.scene)
         if is_fem(method) and binaries[True] is None:
             left_out.append({"axes": combination.axes, "case": case_of(combination), "variant": method, "method": "fem",
