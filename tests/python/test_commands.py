@@ -9,6 +9,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from testbed_reports.read.study_file import read_study
+from testbed_reports.study.study import expand
 
 ROOT = Path(__file__).resolve().parents[2]
 TESTBED = Path(os.environ.get("TESTBED") or ROOT / "build" / "bin" / "testbed")
@@ -334,3 +336,11 @@ def test_study_goes_on_after_a_kill_and_repeats_nothing(tmp_path):
     done = subprocess.run([str(TESTBED), "report", str(tmp_path / "out"), "-o", str(tmp_path / "report")], capture_output=True,
                           text=True, timeout=300)
     assert done.returncode == 0 and (tmp_path / "report" / "report.html").stat().st_size > 10000, done.stderr
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks" / "studies").glob("*.toml")), ids=lambda path: path.stem)
+def test_the_solver_takes_every_shipped_study(tmp_path, path):
+    study = read_study(path)
+    first = [combination for combination in study.combinations if not combination.bisection]
+    entries, left_out, tasks = expand(study, first[::max(1, len(first) // 30)], TESTBED, tmp_path, False, 2)
+    assert entries and len(tasks) == len(entries) and all("testbed-fem" in entry["reason"] for entry in left_out)
