@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Table:
-    """`header` and `rows` of strings; the first `text_columns` are words, the rest numbers."""
+    """`header` and `rows` of strings; the first `text_columns` are words, the rest numbers. `folded`: the page shows it when asked to."""
     name: str
     title: str
     header: list
     rows: list
     text_columns: int = 1
     notes: list = field(default_factory=list)
+    folded: bool = False
 
 
 def as_csv(table):

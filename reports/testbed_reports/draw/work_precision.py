@@ -28,6 +28,7 @@ class Cost:
     most_s: float
     dofs: float
     busy: bool
+    runs: list
 
 
 def error_of(run, entry):
@@ -58,7 +59,8 @@ def costs_of(runs, entry, cores=None):
         settings = {k: v for k, v in values.items() if k not in ("repeat", "dt", "L", "grid.cell_size", "case", "scene", "method", "variant", "seed")}
         times = [seconds for _, _, seconds in same]
         costs.append(Cost(values.get("L"), settings, float(np.mean([error for _, error, _ in same])), float(np.median(times)), min(times), max(times),
-                          float(same[0][0].result.performance.get("dofs", math.nan)), any(is_busy(run, cores) for run, _, _ in same)))
+                          float(same[0][0].result.performance.get("dofs", math.nan)), any(is_busy(run, cores) for run, _, _ in same),
+                          [run for run, _, _ in same]))
     return sorted(costs, key=lambda c: (-(c.L or 0), c.solve_s)), lost
 
 

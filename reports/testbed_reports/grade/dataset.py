@@ -4,12 +4,14 @@ import math
 import os
 import re
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from ..read.results import Result, ResultError
 from ..read.study_file import StudyError, matches, read_study
 from . import metrics
 from .limits import find_limits
+from .recorded import QUANTITIES, recorded
 from .verdicts import judge_study
 
 PLAN = "plan.json"
@@ -59,8 +61,14 @@ class Run:
         return "; ".join(part for part in parts if part)
 
     def value(self, quantity, norm=""):
-        """The metric, nan when the run has none."""
+        """The metric, or what was recorded last; nan when the run has none."""
+        if (quantity, norm) not in self.rows and quantity in QUANTITIES:
+            return self._recorded.get((quantity, norm), math.nan)
         return self.rows.get((quantity, norm), math.nan)
+
+    @cached_property
+    def _recorded(self):
+        return recorded(self.result) if self.completed and self.result is not None else {}
 
 
 @dataclass

@@ -3,8 +3,8 @@ import csv
 import io
 import math
 
-from ..read.results import ResultError
 from .dataset import NO_SERIES
+from .recorded import recorded
 
 RUN = ("run_id", "case", "method", "variant", "L", "ppc", "dt", "seed")
 NUMBER = ("quantity", "norm", "value", "solve_s", "particle_steps", "status", "soundness", "cause", "remedy")
@@ -16,22 +16,6 @@ def _number(value):
 
 def _count(value):
     return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else value
-
-
-def _recorded(result):
-    """{(quantity, norm): value} of what probes, supports and walls recorded last, and the unknowns: beside what is graded."""
-    rows = {}
-    for kind, names, quantity in ((result.probe, result.probes, "displacement"), (result.support, result.supports, "displacement"),
-                                  (result.support, result.supports, "reaction")):
-        for name in names:
-            try:
-                last = kind(name, quantity)[-1]
-            except (ResultError, IndexError):  # a support has no displacement, an outside code may record less
-                continue
-            rows.update({(f"{quantity}_end", f"{name}.{axis}"): value for axis, value in zip("xy", last)})
-    if "unknowns" in result.performance:
-        rows["unknowns", ""] = result.performance["unknowns"]
-    return rows
 
 
 def metrics_csv(runs):
@@ -48,6 +32,6 @@ def metrics_csv(runs):
                _number(run.values["dt"]), run.values["seed"], *(run.values.get(key, "") for key in axes)]
         last = [_number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")), run.status, run.result.soundness,
                 run.result.cause, run.result.remedy]
-        for (quantity, norm), value in {**run.rows, **_recorded(run.result)}.items():
+        for (quantity, norm), value in {**run.rows, **recorded(run.result)}.items():
             writer.writerow([*own, quantity, norm, repr(float(value)), *last])
     return out.getvalue()

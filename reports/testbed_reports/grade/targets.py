@@ -35,6 +35,12 @@ def number(value, digits=3):
     return f"{value:.{digits - 1}e}"
 
 
+def graded(study):
+    """(quantity, norm) that the study's targets ask for, or, without targets, its figures."""
+    asked = study.spec.targets or [f for f in study.spec.figures if "quantity" in f]
+    return list(dict.fromkeys((entry["quantity"], entry.get("norm", "")) for entry in asked))
+
+
 def digits_of(quantity, norm):
     """Errors are read to three digits; a ratio near one or two needs five."""
     return 3 if metrics.is_error(quantity, norm) else 5

@@ -1,26 +1,26 @@
 """`testbed report`: pages, figures for print, tables for print, from the folders of studies."""
 import argparse
 import os
-import re
 import shlex
 import sys
 from collections import Counter
 from datetime import datetime, timezone
 from pathlib import Path
 
-from ..draw.drawing import FigureError, label_of
-from ..draw.figures import draw
-from ..draw.style import RC, WIDTH, Style, plt
-from ..draw.table import Table, as_csv, as_latex
+from ..draw.drawing import label_of
+from ..draw.style import RC, Style, plt
+from ..draw.table import Table, as_csv
+from ..grade.claims import judge_claims
 from ..grade.dataset import read_study_folder, write_atomically
 from ..grade.loose import study_of
 from ..grade.targets import judge_all
-from ..read.results import ResultError
 from ..read.study_file import StudyError
-from . import bench
+from . import bench, findings
+from .ledger import Ledger
+from .names import slug
 from .page import inline_svg, render
-from .stability_page import stability_section
-from .tables import study_tables, targets_table
+from .study_section import PRINT, study_section, write_table
+from .tables import claims_table, targets_table
 
 
 def find_studies(folders):
@@ -44,10 +44,6 @@ def find_studies(folders):
     return list(dict.fromkeys(p.resolve() for p in found))
 
 
-def slug(text):
-    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
-
-
 def _unique(values):
     return [str(v) for v in dict.fromkeys(values) if v not in (None, "")]
 
@@ -67,24 +63,8 @@ def provenance(studies, command):
     if started:
         rows.append(("Runs started", [started[0]] if len(started) == 1 else [f"{started[0]} to {started[-1]}"]))
     rows.append(("Page made", [datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")]))
-    rows.append(("Made by", _unique([s.plan.get("command") for s in studies] + [command])))
+    rows.append(("Commands", _unique([s.plan.get("command") for s in studies] + [command])))
     return rows, warnings
-
-
-def caption(study, entry, drawing, command):
-    """What is seen, then the runs, the commit and the command."""
-    sentences = [entry.get("caption", "").strip().rstrip(".")] + [n.rstrip(".") for n in drawing.notes]
-    sizes = sorted({r.values["L"] for r in drawing.runs if isinstance(r.values.get("L"), (int, float))}, reverse=True)
-    sentences.append(f"Runs: study {study.name}" + (f", L = {', '.join(f'{s:g}' for s in sizes)} m" if sizes else ""))
-    ratios = [r.value("static", "kinetic_over_strain") for r in drawing.runs]
-    ratios = [r for r in ratios if r == r]
-    if ratios:
-        sentences.append(f"Kinetic/strain energy at the end at most {max(ratios):.2e}")
-    commits = _unique(r.result.provenance.get("commit") for r in drawing.runs if r.result is not None)
-    if commits:
-        sentences.append(f"Commit {', '.join(commits)}")
-    remade = "; ".join(filter(None, (study.plan.get("command"), command)))
-    return ". ".join(filter(None, sentences)) + f". Made by: {remade}"
 
 
 def _figure_labels(studies):
@@ -108,78 +88,27 @@ def _bench_labels(benches):
     return list(dict.fromkeys(labels))
 
 
-def _study_section(study, style, out, command, failures):
-    figures, used = [], Counter()
-    for entry in study.spec.figures:
-        what = (entry.get("quantity") or entry.get("component") or " ".join(filter(None, (entry.get("y"), entry.get("x"))))
-                or ("deformed_grid" if entry.get("deformed_grid") else ""))
-        name = slug(entry.get("name") or "_".join(filter(None, (entry["kind"], what, entry.get("norm", "")))))
-        used[name] += 1
-        name = f"{slug(study.name)}_{name}" + (f"_{used[name]}" if used[name] > 1 else "")
-        title = entry.get("title") or f"{entry['kind']}: {what} {entry.get('norm', '')}".replace("_", " ").strip()
-        title = title[:1].upper() + title[1:]
-        shown = {"title": title, "image": "", "caption": "", "error": "", "width": "column", "rem": 0, "anchor": f"figure-{name}",
-                 "paper": entry.get("paper", "").strip(), "shows": entry.get("shows", "").strip()}
-        try:
-            with plt.rc_context(RC):
-                drawing = draw(study, entry, style)
-                drawing.figure.savefig(out / "figures" / f"{name}.pdf", dpi=300,
-                                       metadata={"CreationDate": None, "Creator": None, "Producer": None})
-                shown["image"] = inline_svg(drawing.figure)
-                inches = drawing.figure.get_figwidth()
-                shown["width"], shown["rem"] = "page" if inches > 1.05 * WIDTH["column"] else "column", round(62 / 7 * inches, 1)
-                shown["caption"] = caption(study, entry, drawing, command)
-        except (FigureError, ResultError) as error:
-            shown["error"] = str(error)
-            failures.append([study.name, f"figure {name}", "not drawn", str(error)])
-        finally:
-            plt.close("all")
-        figures.append(shown)
-    stability, files = None, []
-    if study.spec.cases:
-        stability, tables, files = stability_section(study, style, out, slug(study.name))
-    else:
-        tables = study_tables(study)
-    for table in files:
-        _write_table(out, study, table)
-    counts = Counter("suspect" if run.suspect else run.status for run in study.runs)
-    summary = f"{len(study.runs)} runs: " + ", ".join(f"{n} {status}" for status, n in counts.items()) + "."
-    if study.left_out:
-        summary += f" {len(study.left_out)} combinations left out."
-    return {"anchor": f"study-{slug(study.name)}", "title": study.spec.title, "purpose": study.spec.purpose,
-            "summary": summary, "figures": figures, "tables": tables, "stability": stability}
-
-
-def _write_table(out, study, table):
-    """A table for print and for other programs."""
-    base = out / "tables" / f"{slug(study.name)}_{slug(table.name)}"
-    write_atomically(base.with_suffix(".csv"), as_csv(table))
-    write_atomically(base.with_suffix(".tex"), as_latex(table))
-
-
-def _bench_section(path, style, out, failures):
+def _bench_section(path, style, out, ledger, failures):
     """The section of one bench.csv; None when it cannot be used."""
     try:
         comment, rows = bench.read_bench(path)
     except (OSError, bench.BenchError) as error:
         failures.append([path.parent.name, bench.FILE, "unreadable", str(error).replace(str(path.parent) + os.sep, "")])
         return None
-    name = f"{slug(path.parent.name)}_bench_rates"
+    own = f"{slug(path.parent.name)}_bench"
     with plt.rc_context(RC):
         figure = bench.rates_figure(rows, style)
-        figure.savefig(out / "figures" / f"{name}.pdf", dpi=300, metadata={"CreationDate": None, "Creator": None, "Producer": None})
+        figure.savefig(out / "figures" / f"{own}_rates.pdf", **PRINT)
+        caption = f"Fastest of ten slices; full lines one thread, thin lines more. {comment}. Made by: testbed bench"
         shown = {"title": "Particle-steps per second against the number of points", "image": inline_svg(figure), "error": "", "width": "page",
-                 "rem": 62, "anchor": f"figure-{name}", "paper": "", "shows": "",
-                 "caption": f"Fastest of ten slices; full lines one thread, thin lines more. {comment}. Made by: testbed bench"}
+                 "rem": 62, "anchor": f"figure-{own}_rates", "paper": "", "shows": [], "caption": [caption], "runs": []}
     plt.close("all")
     tables = [t for t in (bench.rates_table(rows), bench.cost_table(rows)) if t]
     for table in tables:
-        base = out / "tables" / f"{slug(path.parent.name)}_bench_{table.name}"
-        write_atomically(base.with_suffix(".csv"), as_csv(table))
-        write_atomically(base.with_suffix(".tex"), as_latex(table))
-    return {"anchor": f"bench-{slug(path.parent.name)}", "title": "Speed", "purpose": "The particle methods alone, in one process, beside the "
-            "bandwidth of the memory." + (" Measured on a busy machine." if bench.is_busy(comment) else ""), "summary": f"{len(rows)} measurements.",
-            "figures": [shown], "tables": tables}
+        write_table(out, own, table)
+    purpose = "The particle methods alone, in one process, beside the bandwidth of the memory." + (" Measured on a busy machine." if bench.is_busy(comment) else "")
+    return {"anchor": f"bench-{slug(path.parent.name)}", "title": "Speed", "purpose": [purpose], "summary": f"{len(rows)} measurements.",
+            "figures": [shown], "tables": [(f"table-{own}_{t.name}", t) for t in tables], "stability": None, "runs": []}
 
 
 def _write_gallery(out, title, sections):
@@ -193,25 +122,16 @@ def _write_gallery(out, title, sections):
     return bool(shown)
 
 
-def build(folders, out, command, unreadable=None):
-    """Writes the report of studies into the folder `out`; returns the path of the page. `unreadable`: a list for what could not be read or
-    drawn."""
-    out = Path(out)
-    studies, failures = [], []
-    unreadable = [] if unreadable is None else unreadable
-    files = [folder for folder in map(Path, folders) if folder.is_file()]
-    folders = [folder for folder in folders if Path(folder) not in files]
-    if files:
-        studies.append(study_of(files))
-    for folder in find_studies(folders):
+def _read(folders, failures, unreadable):
+    """The studies of folders and of result files."""
+    files = [folder for folder in folders if folder.is_file()]
+    studies = [study_of(files)] if files else []
+    for folder in find_studies([folder for folder in folders if folder not in files]):
         try:
             studies.append(read_study_folder(folder))
         except StudyError as error:
-            failures.append([folder.name, "the whole study", "unreadable",
-                             str(error).replace(str(folder) + os.sep, "")])
+            failures.append([folder.name, "the whole study", "unreadable", str(error).replace(str(folder) + os.sep, "")])
             unreadable.append(str(error))
-    for name in ("figures", "tables"):
-        (out / name).mkdir(parents=True, exist_ok=True)
     for study in studies:
         failures += [[study.name, name, "of another code", "no run of the study's plan: its result lies in runs/ and is taken"] for name in study.outside]
         for run in study.runs:
@@ -220,26 +140,71 @@ def build(folders, out, command, unreadable=None):
             if run.status == "unreadable":
                 unreadable.append(f"{study.name}: {run.id}: {run.reason}")
             failures += [[study.name, run.id, "number missing", error] for error in run.errors]
-    benches = [path for path in (Path(folder) / bench.FILE for folder in folders) if path.is_file()]
+    return studies
+
+
+def _claims(studies, ledger):
+    """The claims of all studies as the template wants them."""
+    return [{"name": claim.name, "words": claim.words, "source": claim.source, "verdict": claim.verdict, "conditions": claim.conditions,
+             "notes": [ledger.text(study, text) for text, study in claim.notes],
+             "tests": [{"when": t.when, "asked": t.asked, "measured": ledger.pieces(t.measured), "verdict": t.verdict,
+                        "note": t.measured.missing, "study": t.study} for t in claim.tests]} for claim in judge_claims(studies)]
+
+
+def _lead(sections):
+    """Two figures for the first screen: the first of error against time and of error against cell size that was drawn, or else the first two."""
+    drawn = [f for section in sections for f in section["figures"] if f["image"]]
+    chosen = [next((f for f in drawn if f.get("kind") == kind), None) for kind in ("work_precision", "convergence")]
+    chosen = [f for f in chosen if f is not None]
+    return chosen + [f for f in drawn if not any(f is c for c in chosen)][:2 - len(chosen)]
+
+
+def _first_screen(studies, sections, claims, verdicts, ledger):
+    """What stands above everything else."""
+    rows = findings.questions(studies)
+    said = [ledger.pieces(*parts) for parts in findings.sentences(studies, rows)]
+    variants = list(dict.fromkeys(v for row in rows for v in row.cells))
+    matrix = [{"text": row.text, "anchor": row.anchor,
+               "cells": [{"piece": ledger.pieces(row.cells.get(v, ""))[0], "best": v in row.best} for v in variants]} for row in rows]
+    bad = [(study.name, run) for study in studies for run in study.runs if run.suspect or not run.completed]
+    return {"compared": findings.compared(studies) if studies else "", "sentences": said, "variants": variants, "matrix": matrix,
+            "lead": _lead(sections), "targets": Counter(v.verdict for _, v in verdicts), "missed": [v for _, v in verdicts if v.verdict == "fail"],
+            "claims": Counter(claim["verdict"] for claim in claims),
+            "bad": Counter(run.status if not run.completed else "suspect" for _, run in bad),
+            "which": list(dict.fromkeys(f"{run.name} ({run.values.get('case') or name})" for name, run in bad))}
+
+
+def build(folders, out, command, unreadable=None):
+    """Writes the report of studies into the folder `out`; returns the path of the page. `unreadable`: a list for what could not be read or
+    made."""
+    out, folders, failures, ledger = Path(out), [Path(folder) for folder in folders], [], Ledger()
+    unreadable = [] if unreadable is None else unreadable
+    studies = _read(folders, failures, unreadable)
+    for name in ("figures", "tables"):
+        (out / name).mkdir(parents=True, exist_ok=True)
+    benches = [path for path in (folder / bench.FILE for folder in folders) if path.is_file()]
     style = Style(_figure_labels(studies) + _bench_labels(benches))
     verdicts = [(study, judge_all(study)) for study in studies]
-    sections = [_study_section(study, style, out, command, failures) for study in studies]
-    unreadable += [f"{name}: {what}: {reason}" for name, what, how, reason in failures if how == "not drawn"]
+    sections = [study_section(study, style, out, ledger, failures) for study in studies]
     for (study, judged), section in zip(verdicts, sections):
-        for table in section["tables"] + ([targets_table(judged)] if judged else []):
-            _write_table(out, study, table)
-    sections += [section for path in benches if (section := _bench_section(path, style, out, failures))]
+        for table in [t for _, t in section["tables"]] + ([targets_table(judged)] if judged else []):
+            write_table(out, study.name, table)
+    sections += [section for path in benches if (section := _bench_section(path, style, out, ledger, failures))]
+    claims, flat = _claims(studies, ledger), [(study, v) for study, judged in verdicts for v in judged]
+    if claims:
+        write_table(out, "report", claims_table(claims))
+    failures += [[study, what, "not made", why] for study, what, why in ledger.missing]
+    unreadable += [f"{name}: {what}: {reason}" for name, what, how, reason in failures if how in ("not drawn", "not made")]
     rows, warnings = provenance(studies, command)
-    flat = [(study.name, v) for study, judged in verdicts for v in judged]
-    counted = Counter(v.verdict for _, v in flat)
     left_out = [[s.name, e.get("variant") or "", ", ".join(f"{k} = {v}" for k, v in e.get("axes", {}).items()),
                  e.get("reason", "")] for s in studies for e in s.left_out]
     titles = [section["title"] for section in sections]
     title = titles[0] if len(titles) == 1 else "Testbed report"
+    first = _first_screen(studies, sections, claims, flat, ledger)
+    write_atomically(out / "numbers.csv", as_csv(ledger.table()))
     gallery = _write_gallery(out, title, sections)
-    page = render("template.html", title=title, gallery=gallery, provenance=rows, warnings=warnings,
-                  studies=sections, verdicts=flat,
-                  counts=", ".join(f"{counted[k]} {k}" for k in ("pass", "fail", "known", "not run") if counted[k]) + ".",
+    page = render("template.html", title=title, gallery=gallery, provenance=rows, warnings=warnings, first=first, claims=claims,
+                  studies=sections, verdicts=[(study.name, v) for study, v in flat], numbers=ledger.table(),
                   failures=Table("failures", "Failures", ["study", "what", "status", "reason"], failures, 4),
                   left_out=Table("left_out", "Left out", ["study", "variant", "combination", "reason"], left_out, 4))
     write_atomically(out / "report.html", page)
@@ -266,5 +231,5 @@ def main(arguments=None):
     print(os.path.relpath(page))
     if unreadable:
         more = f"\n  and {len(unreadable) - 20} more" if len(unreadable) > 20 else ""
-        print("testbed report: these could not be read or drawn, the report goes without them:\n  " + "\n  ".join(unreadable[:20]) + more, file=sys.stderr)
+        print("testbed report: these could not be read or made, the report goes without them:\n  " + "\n  ".join(unreadable[:20]) + more, file=sys.stderr)
     return 1 if unreadable else 0

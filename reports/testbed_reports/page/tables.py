@@ -1,6 +1,7 @@
 """The tables of a study."""
 import math
 import statistics
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from ..draw.work_precision import is_busy, reach
 from ..grade import metrics
 from ..grade.convergence import fit_order, fit_power, pairwise_orders
 from ..grade.dataset import groups
-from ..grade.targets import digits_of, mean_by_size, number, values_by_size
+from ..grade.targets import digits_of, graded, mean_by_size, number, values_by_size
 
 
 def _range(values, digits=3):
@@ -142,7 +143,7 @@ def performance_table(study):
         notes.append(f"busy: the load average at the start was above the {cores} cores.")
     header = ["variant", "L [m]", "points", "steps", "solve [s]", "set-up [s]", "output [s]", "particle steps [1/s]",
               "memory [B/point]", "load", "status"]
-    return Table("performance", "Performance", header, rows, notes=notes)
+    return Table("performance", "Performance", header, rows, notes=notes, folded=True)
 
 
 def reach_table(study, entry):
@@ -157,10 +158,20 @@ def targets_table(verdicts):
                  [[v.label, v.asked, v.measured, v.verdict, v.note, v.source] for v in verdicts], 6)
 
 
+def claims_table(claims):
+    """Every test of every claim, for other programs."""
+    def plain(pieces):
+        return "".join(p if isinstance(p, str) else str(p[1]) for p in pieces)
+    rows = [[c["name"], c["verdict"], t["when"], t["asked"], plain(t["measured"]), t["verdict"], t["study"], c["source"]] for c in claims
+            for t in c["tests"] or [{"when": "", "asked": "", "measured": [], "verdict": "not run", "study": ""}]]
+    return Table("claims", "Claims", ["claim", "verdict", "if", "asked", "measured", "test", "study", "source"], rows, 8)
+
+
 def study_tables(study):
-    """All tables of a study but the targets."""
-    found = [convergence_table(study, *key) for key in pairs(study)]
-    tables = [t for t in found if t]
+    """All tables of a study but the targets. What the targets do not ask for is folded away."""
+    asked = graded(study)
+    found = [(key, convergence_table(study, *key)) for key in pairs(study)]
+    tables = [replace(t, folded=key not in asked) for key, t in found if t]
     if not tables:
         tables = values_tables(study)
     asked = [entry["quantity"] for entry in study.spec.figures if entry["kind"] == "power_law"]

@@ -5,12 +5,14 @@ from pathlib import Path
 
 from .combinations import expand_axes
 from .figure_tables import read_figures
+from .number_tables import check_texts, read_claims, read_numbers
 from .study_reader import LIST, NUMBER, TABLE, TEXT, Reader, StudyError
 from .spelling import did_you_mean
 from .values import flatten, matches, same, toml_value  # noqa: F401 (offered here to others)
 
 STUDY_KEYS = {"title": TEXT, "purpose": TEXT, "scene": TEXT, "repeats": (int,), "threads": (int,), "set": TABLE,
-              "axes": TABLE, "exclude": LIST, "override": LIST, "case": LIST, "failure": LIST, "remedy": LIST, "target": LIST, "figure": LIST}
+              "axes": TABLE, "exclude": LIST, "override": LIST, "case": LIST, "failure": LIST, "remedy": LIST, "target": LIST, "figure": LIST,
+              "number": LIST, "claim": LIST}
 CASE_KEYS = {"name": TEXT, "title": TEXT, "scene": TEXT, "purpose": TEXT, "parameter": TEXT, "set": TABLE, "axes": TABLE,
              "exclude": LIST, "override": LIST, "bound": LIST}
 BOUND_KEYS = {"quantity": TEXT, "norm": TEXT, "min": NUMBER, "max": NUMBER, "failed": NUMBER, "where": TABLE, "source": TEXT}
@@ -57,6 +59,8 @@ class StudyFile:
     cases: list = field(default_factory=list)
     failures: list = field(default_factory=list)
     remedies: list = field(default_factory=list)
+    numbers: dict = field(default_factory=dict)
+    claims: list = field(default_factory=list)
 
     @property
     def name(self):
@@ -179,5 +183,7 @@ def read_study(path, need_scene=True):
     columns = set(COLUMNS) | set(axes)
     targets, figures = _read_targets(reader, columns), read_figures(reader, columns)
     failures, remedies = _read_failures(reader, cases, columns)
+    numbers, claims = read_numbers(reader, columns), read_claims(reader, columns)
+    check_texts(reader, data, numbers)
     return StudyFile(reader.path, data["title"], data.get("purpose", ""), data.get("repeats", 1),
-                     combinations, targets, figures, cases, failures, remedies)
+                     combinations, targets, figures, cases, failures, remedies, numbers, claims)

@@ -1,0 +1,61 @@
+"""Claims of a source, judged by runs: holds, holds only if ..., refuted, not tested."""
+import math
+from dataclasses import dataclass, field
+
+from .numbers import Number, number_of
+from .targets import number
+
+
+@dataclass
+class Test:
+    """One test of a claim: under the condition `when` the measured number must lie in `asked`. `verdict`: 'pass', 'fail' or 'not run'."""
+    when: str
+    asked: str
+    measured: Number
+    verdict: str
+    study: str
+
+
+@dataclass
+class Claim:
+    """What a source says, and what the runs say of it."""
+    name: str
+    words: str
+    source: str
+    notes: list = field(default_factory=list)  # texts with the names of numbers, and the study they are of
+    tests: list = field(default_factory=list)
+
+    @property
+    def verdict(self):
+        done = [test for test in self.tests if test.verdict != "not run"]
+        held = [test for test in done if test.verdict == "pass"]
+        if not done:
+            return "not tested"
+        if len(held) == len(done):
+            return "holds"
+        return "holds only if" if held else "refuted"
+
+    @property
+    def conditions(self):
+        """Under which it holds, of a claim that does not always."""
+        return [test.when for test in self.tests if test.verdict == "pass"] if self.verdict == "holds only if" else []
+
+
+def _judge(study, entry):
+    measured = number_of(study, entry)
+    low, high = entry.get("min", -math.inf), entry.get("max", math.inf)
+    asked = " ".join(filter(None, (entry["quantity"], entry["norm"]))).replace("_", " ")
+    asked = (f"{number(low)} ≤ " if math.isfinite(low) else "") + asked + (f" ≤ {number(high)}" if math.isfinite(high) else "")
+    inside = bool(measured.values) and not measured.missing and all(low <= v <= high for v in measured.values)
+    return Test(entry["if"], asked, measured, "pass" if inside else "fail" if measured.runs else "not run", study.name)
+
+
+def judge_claims(studies):
+    """The claims of all studies; tests of one name in several studies belong to one claim."""
+    found = {}
+    for study in studies:
+        for entry in study.spec.claims:
+            claim = found.setdefault(entry["name"], Claim(entry["name"], entry["words"], entry["source"]))
+            claim.notes += [(entry["note"], study)] if entry["note"] else []
+            claim.tests += [_judge(study, test) for test in entry["test"]]
+    return list(found.values())
