@@ -1,9 +1,9 @@
 """Claims of a source, judged by runs: holds, holds only if ..., refuted, not tested."""
 import math
+import re
 from dataclasses import dataclass, field
 
 from .numbers import Number, number_of
-from .targets import number
 
 
 @dataclass
@@ -45,7 +45,8 @@ def _judge(study, entry):
     measured = number_of(study, entry)
     low, high = entry.get("min", -math.inf), entry.get("max", math.inf)
     asked = " ".join(filter(None, (entry["quantity"], entry["norm"]))).replace("_", " ")
-    asked = (f"{number(low)} ≤ " if math.isfinite(low) else "") + asked + (f" ≤ {number(high)}" if math.isfinite(high) else "")
+    asked = ("" if entry["take"] == "every" else f"{entry['take']} of ") + asked + (" over that of the other" if "over" in entry else "")
+    asked = (f"{low:g} ≤ " if math.isfinite(low) else "") + asked + (f" ≤ {high:g}" if math.isfinite(high) else "")
     inside = bool(measured.values) and not measured.missing and all(low <= v <= high for v in measured.values)
     return Test(entry["if"], asked, measured, "pass" if inside else "fail" if measured.runs else "not run", study.name)
 
@@ -58,4 +59,4 @@ def judge_claims(studies):
             claim = found.setdefault(entry["name"], Claim(entry["name"], entry["words"], entry["source"]))
             claim.notes += [(entry["note"], study)] if entry["note"] else []
             claim.tests += [_judge(study, test) for test in entry["test"]]
-    return list(found.values())
+    return sorted(found.values(), key=lambda claim: (not claim.name[:1].isdigit(), [int(n) for n in re.findall(r"\d+", claim.name)[:1]], claim.name if claim.name[:1].isdigit() else ""))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..read.results import TENSOR, ResultError
 from ..read.spelling import did_you_mean
-from . import norms, soil_metrics, stability_metrics
+from . import norms, picture_metrics, soil_metrics, stability_metrics
 from .metric_base import MetricError, need, nonzero
 
 ALWAYS = ("particle_steps_per_second", "bytes_per_point", "solve_s")
@@ -177,6 +177,7 @@ GROUPS = {
     "angular_momentum": (angular_momentum, [("angular_momentum", "retained"), ("angular_momentum", "error")]),
     "spurious_stress": (spurious_stress, [("spurious_stress", "max")]),
     **soil_metrics.GROUPS,
+    **picture_metrics.GROUPS,
     **stability_metrics.GROUPS,
 }
 

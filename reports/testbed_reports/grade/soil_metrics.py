@@ -57,6 +57,11 @@ def compression(result):
     top = int(np.argmax(stress))
     rows = {("modulus", "initial"): modulus, ("peak", "stress"): stress[top], ("peak", "strain"): strain[top],
             ("residual", "stress"): residual}
+    if len(stress) > 2:
+        rows["curve", "secant"] = stress[top] / (strain[top] * modulus)
+        after = np.diff(stress[strain > 2 * strain[top]])
+        if len(after) > 2:
+            rows["curve", "roughness"] = np.std(after)
     _ratio(rows, ("modulus", "ratio"), modulus, numbers, "plane_strain_modulus")
     _ratio(rows, ("peak", "ratio"), stress[top], numbers, "peak_stress")
     _ratio(rows, ("residual", "ratio"), residual, numbers, "residual_stress")
@@ -64,7 +69,7 @@ def compression(result):
 
 
 def _compression_rows(result):
-    return [("modulus", "initial"), ("peak", "stress"), ("peak", "strain"), ("residual", "stress"),
+    return [("modulus", "initial"), ("peak", "stress"), ("peak", "strain"), ("residual", "stress"), ("curve", "secant"), ("curve", "roughness"),
             *_ratios(result, (("modulus", "ratio"), "plane_strain_modulus"), (("peak", "ratio"), "peak_stress"),
                      (("residual", "ratio"), "residual_stress"))]
 

@@ -6,11 +6,12 @@ from dataclasses import dataclass, field, replace
 from ..draw.drawing import name_of
 from ..draw.work_precision import ACCURACIES, cheapest, costs_of
 from ..grade import metrics
-from ..grade.numbers import Number, taken
+from ..grade.numbers import Number, number_of, taken
 from ..grade.targets import NOT_CONVERGING_ORDER, graded, in_sizes, number
-from .names import figure_anchor, figure_names, table_anchor
+from .names import figure_anchor, figure_names, study_anchor, table_anchor
 
 BY_METHOD = ("method", "variant")
+PLAIN = {"take": "every", "scale": 1, "offset": 0, "digits": 3}
 
 
 @dataclass
@@ -116,6 +117,27 @@ def _reaches(study):
     return found
 
 
+def _values(study):
+    """Questions for what is measured where nothing converges: the quantities of targets on values, of every method."""
+    found = {}
+    for target in study.spec.targets:
+        quantity, norm = target["quantity"], target.get("norm", "")
+        where = {k: v for k, v in target["where"].items() if k not in BY_METHOD}
+        if not target["kind"].startswith("value") or quantity == "static":
+            continue
+        about = _about(study, where, quantity, norm)
+        question = Question(about[:1].upper() + about[1:], about, "value", study_anchor(study))
+        for variant, runs in _variants(study.select(where)).items():
+            made = number_of(study, {**PLAIN, "quantity": quantity, "norm": norm, "where": {**where, "variant": variant}})
+            if made.values:
+                question.cells[variant] = made
+            elif any(not run.completed for run in runs):
+                question.cells[variant] = next(run.status for run in runs if not run.completed)
+        if question.cells:
+            found[quantity, norm, str(where)] = question
+    return list(found.values())
+
+
 def _failures(studies):
     """The question how many runs diverged or are suspect."""
     question = Question("Runs that failed or are suspect, of all", "", "failures", "failures")
@@ -131,7 +153,9 @@ def _failures(studies):
 def questions(studies):
     """All rows of the matrix."""
     plain = [study for study in studies if not study.spec.cases]
-    rows = [q for study in plain for q in _slopes(study)] + [q for study in plain for q in _reaches(study)]
+    slopes, reaches = {s.folder: _slopes(s) for s in plain}, {s.folder: _reaches(s) for s in plain}
+    rows = [q for found in (slopes, reaches) for study in plain for q in found[study.folder]]
+    rows += [q for study in plain if not slopes[study.folder] and not reaches[study.folder] for q in _values(study)]
     return rows + ([_failures(studies)] if any(study.runs for study in studies) else [])
 
 
@@ -232,9 +256,17 @@ def _static(studies):
     return [[f"Not comparable in seconds (†): {_listed(found)} solve {_listed(cases)} once, as statics, where the other methods damp a motion until it rests."]]
 
 
-def sentences(studies, rows):
+def _claimed(claims):
+    """Which claims do not hold as they stand."""
+    refuted = [claim.name for claim in claims if claim.verdict == "refuted"]
+    half = [claim.name for claim in claims if claim.verdict == "holds only if"]
+    parts = ([f"Refuted by these runs: {'; '.join(refuted)}."] if refuted else []) + ([f"Holding only under a condition: {'; '.join(half)}."] if half else [])
+    return [[" ".join(parts)]] if parts else []
+
+
+def sentences(studies, rows, claims):
     """Three to six sentences as lists of strings and Numbers."""
-    return [*_fastest(rows), *_orders(rows), *_spread(rows)[:2], *_failing(studies), *_static(studies)]
+    return [*_fastest(rows), *_orders(rows), *_spread(rows)[:2], *_claimed(claims), *_failing(studies), *_static(studies)]
 
 
 def compared(studies):

@@ -143,12 +143,12 @@ def _read(folders, failures, unreadable):
     return studies
 
 
-def _claims(studies, ledger):
-    """The claims of all studies as the template wants them."""
+def _claims(judged, ledger):
+    """Claims as the template wants them."""
     return [{"name": claim.name, "words": claim.words, "source": claim.source, "verdict": claim.verdict, "conditions": claim.conditions,
              "notes": [ledger.text(study, text) for text, study in claim.notes],
              "tests": [{"when": t.when, "asked": t.asked, "measured": ledger.pieces(t.measured), "verdict": t.verdict,
-                        "note": t.measured.missing, "study": t.study} for t in claim.tests]} for claim in judge_claims(studies)]
+                        "note": t.measured.missing, "study": t.study} for t in claim.tests]} for claim in judged]
 
 
 def _lead(sections):
@@ -162,14 +162,14 @@ def _lead(sections):
 def _first_screen(studies, sections, claims, verdicts, ledger):
     """What stands above everything else."""
     rows = findings.questions(studies)
-    said = [ledger.pieces(*parts) for parts in findings.sentences(studies, rows)]
+    said = [ledger.pieces(*parts) for parts in findings.sentences(studies, rows, claims)]
     variants = list(dict.fromkeys(v for row in rows for v in row.cells))
     matrix = [{"text": row.text, "anchor": row.anchor,
                "cells": [{"piece": ledger.pieces(row.cells.get(v, ""))[0], "best": v in row.best} for v in variants]} for row in rows]
     bad = [(study.name, run) for study in studies for run in study.runs if run.suspect or not run.completed]
     return {"compared": findings.compared(studies) if studies else "", "sentences": said, "variants": variants, "matrix": matrix,
             "lead": _lead(sections), "targets": Counter(v.verdict for _, v in verdicts), "missed": [v for _, v in verdicts if v.verdict == "fail"],
-            "claims": Counter(claim["verdict"] for claim in claims),
+            "claims": Counter(claim.verdict for claim in claims),
             "bad": Counter(run.status if not run.completed else "suspect" for _, run in bad),
             "which": list(dict.fromkeys(f"{run.name} ({run.values.get('case') or name})" for name, run in bad))}
 
@@ -190,7 +190,8 @@ def build(folders, out, command, unreadable=None):
         for table in [t for _, t in section["tables"]] + ([targets_table(judged)] if judged else []):
             write_table(out, study.name, table)
     sections += [section for path in benches if (section := _bench_section(path, style, out, ledger, failures))]
-    claims, flat = _claims(studies, ledger), [(study, v) for study, judged in verdicts for v in judged]
+    judged_claims = judge_claims(studies)
+    claims, flat = _claims(judged_claims, ledger), [(study, v) for study, judged in verdicts for v in judged]
     if claims:
         write_table(out, "report", claims_table(claims))
     failures += [[study, what, "not made", why] for study, what, why in ledger.missing]
@@ -200,7 +201,7 @@ def build(folders, out, command, unreadable=None):
                  e.get("reason", "")] for s in studies for e in s.left_out]
     titles = [section["title"] for section in sections]
     title = titles[0] if len(titles) == 1 else "Testbed report"
-    first = _first_screen(studies, sections, claims, flat, ledger)
+    first = _first_screen(studies, sections, judged_claims, flat, ledger)
     write_atomically(out / "numbers.csv", as_csv(ledger.table()))
     gallery = _write_gallery(out, title, sections)
     page = render("template.html", title=title, gallery=gallery, provenance=rows, warnings=warnings, first=first, claims=claims,

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..draw.drawing import name_of
 from ..draw.table import Table
 from ..draw.work_precision import is_busy, reach
 from ..grade import metrics
@@ -20,6 +21,28 @@ def _range(values, digits=3):
         return "n/a"
     middle = number(statistics.median(values), digits)
     return middle if min(values) == max(values) else f"{middle} [{number(min(values), digits)}–{number(max(values), digits)}]"
+
+
+def told(runs, key):
+    """The metric `key` of some runs in words: 'mean ± standard deviation (n)' over seeds, else the median of repeats and their range."""
+    digits = digits_of(*key)
+    by_seed = {}
+    for run in runs:
+        if math.isfinite(run.value(*key)):
+            by_seed.setdefault(str(run.values.get("seed", "")), []).append(run.value(*key))
+    seeds = {str(run.values.get("seed", "")) for run in runs}
+    if len(seeds) < 2 or not by_seed:
+        return _range([run.value(*key) for run in runs], digits)
+    means = [statistics.fmean(values) for values in by_seed.values()]
+    spread = f" ± {number(statistics.stdev(means), 2)}" if len(means) > 1 else ""
+    return f"{number(statistics.fmean(means), digits)}{spread} ({len(means)} of {len(seeds)} seeds)" if len(means) < len(seeds) else \
+        f"{number(statistics.fmean(means), digits)}{spread} ({len(means)} seeds)"
+
+
+def unit_of(quantity, norm):
+    """' [m]' of a quantity that has a unit."""
+    name = name_of(quantity, norm)
+    return " [" + name.rsplit("[", 1)[1].replace("$", "") if name.endswith("]") else ""
 
 
 def _whole(value):
@@ -62,7 +85,7 @@ def convergence_table(study, quantity, norm):
             at = np.flatnonzero(own == size)
             value, order = (mean[at[0]], orders[at[0]]) if len(at) else (math.nan, math.nan)
             status = next((r.status for r in runs if r.values.get("L") == size and not r.completed), None)
-            row.append(number(float(value), digits_of(quantity, norm)) if math.isfinite(value)
+            row.append(told([r for r in runs if r.values.get("L") == size], (quantity, norm)) if math.isfinite(value)
                        else status or ("n/a" if len(at) else ""))
             if ordered and k:
                 row.append(f"{order:.2f}" if math.isfinite(order) else "")
@@ -93,8 +116,9 @@ def _interval(low, high, text):
     return f"[{text(low)}, {text(high)}]" if math.isfinite(low) else ""
 
 
-def values_tables(study):
-    """Every number of studies with one cell size, a table for each case: rows are variants, columns quantities."""
+def values_tables(study, asked):
+    """Numbers of studies with one cell size, two tables for each case: of what is asked for, and folded away of all. Rows are variants, columns
+    quantities, or the other way round where there are more of these."""
     tables = []
     for case in dict.fromkeys(run.values.get("case", "") for run in study.runs if run.rows):
         series = {}
@@ -103,18 +127,25 @@ def values_tables(study):
             if own:
                 series[label] = own
         keys = [key for key in pairs(study) if any(key in run.rows for runs in series.values() for run in runs)]
-        rows = []
-        for label, runs in series.items():
-            row = [label]
-            for key in keys:
-                values = [run.value(*key) for run in runs]
-                row.append(_range(values, digits_of(*key))
-                           if any(map(math.isfinite, values)) else next((r.status for r in runs if not r.completed), "n/a"))
-            rows.append(row)
-        header = ["variant", *(" ".join(key).replace("_", " ").strip() for key in keys)]
         title = f"Measured quantities: {case}".replace("_", " ").removesuffix(": ")
-        tables.append(Table(f"values_{case}".rstrip("_"), title, header, rows))
+        few = [key for key in keys if key in asked]
+        if few:
+            tables.append(_values(f"values_{case}".rstrip("_"), title, series, few))
+        if few != keys:
+            tables.append(replace(_values(f"all_values_{case}".rstrip("_"), f"All of it. {title}", series, keys), folded=True))
     return tables
+
+
+def _values(name, title, series, keys):
+    """{label: runs} against (quantity, norm)."""
+    def text(runs, key):
+        values = [run.value(*key) for run in runs]
+        return told(runs, key) if any(map(math.isfinite, values)) else next((r.status for r in runs if not r.completed), "n/a")
+
+    what = [" ".join(key).replace("_", " ").strip() + unit_of(*key) for key in keys]
+    if len(keys) > len(series):
+        return Table(name, title, ["quantity", *series], [[w, *(text(runs, key) for runs in series.values())] for w, key in zip(what, keys)])
+    return Table(name, title, ["variant", *what], [[label, *(text(runs, key) for key in keys)] for label, runs in series.items()])
 
 
 def performance_table(study):
@@ -173,7 +204,7 @@ def study_tables(study):
     found = [(key, convergence_table(study, *key)) for key in pairs(study)]
     tables = [replace(t, folded=key not in asked) for key, t in found if t]
     if not tables:
-        tables = values_tables(study)
+        tables = values_tables(study, asked)
     asked = [entry["quantity"] for entry in study.spec.figures if entry["kind"] == "power_law"]
     asked += [target["quantity"] for target in study.spec.targets if target["kind"].startswith("exponent")]
     tables += [power_law_table(study, quantity) for quantity in dict.fromkeys(asked)] + [performance_table(study)]
