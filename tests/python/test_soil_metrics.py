@@ -39,6 +39,10 @@ def compression(soil, stress=STRESS, status="completed", **reference):
 
 def test_compression(soil):
     r = rows(compression(soil, plane_strain_modulus=2e7, peak_stress=2e5, residual_stress=1e5))
+    falling = (AT_RESIDUAL - 2 * AT_PEAK) / (0.1 - 2 * AT_PEAK)  # share of the samples after twice the peak strain, on which the load falls
+    fall = (PEAK - RESIDUAL) / (AT_RESIDUAL - AT_PEAK) * 1e-4
+    assert r.pop(("curve", "roughness")) == pytest.approx(fall * math.sqrt(falling * (1 - falling)), rel=5e-3)
+    assert r.pop(("curve", "secant")) == pytest.approx(1)
     assert r == pytest.approx({
         ("modulus", "initial"): 1.5e7, ("modulus", "ratio"): 0.75, ("peak", "stress"): PEAK, ("peak", "ratio"): 1.5,
         ("peak", "strain"): AT_PEAK, ("residual", "stress"): RESIDUAL, ("residual", "ratio"): 1.2})

@@ -37,7 +37,7 @@ def test_front_keeps_what_nothing_beats():
 
 
 def cost(error, seconds, busy=False):
-    return Cost(1.0, {}, error, seconds, seconds, seconds, 10.0, busy)
+    return Cost(1.0, {}, error, seconds, seconds, seconds, 10.0, busy, [])
 
 
 def test_cheapest_is_the_fastest_that_is_good_enough():

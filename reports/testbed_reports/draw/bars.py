@@ -15,10 +15,12 @@ def bars(study, entry, style):
     quantity, norm = entry["quantity"], entry.get("norm", "")
     runs, notes = one_size(chosen(study, entry), entry), []
     groups = by_series(runs, entry, style)
-    rows = {}
+    rows, most = {}, 1
     for label, own in groups.items():
         good = [v for v in (run.value(quantity, norm) for run in own) if math.isfinite(v)]
-        rows[label] = np.percentile(good, [50, 0, 100]) if good else None
+        seeds = len({str(run.values.get("seed", "")) for run in own})
+        rows[label] = np.array([np.mean(good) if seeds > 1 else np.median(good), min(good), max(good)]) if good else None
+        most = max(most, seeds)
     if all(v is None for v in rows.values()):
         raise FigureError(f"no completed run has {quantity} {norm}".rstrip())
     title, largest = name_of(quantity, norm), max(abs(v[2]) for v in rows.values() if v is not None)
@@ -56,5 +58,5 @@ def bars(study, entry, style):
         axis.locator_params(axis="x", nbins=5)
     axis.set_xlabel(title)
     if any(v is not None and v[2] > v[1] for v in rows.values()):
-        notes.append("Medians with their range")
+        notes.append(f"Means over seeds (up to {most}) with their range" if most > 1 else "Medians with their range")
     return Drawing(figure, runs, notes)

@@ -2,6 +2,7 @@
 import csv
 import io
 import math
+import re
 from dataclasses import dataclass, field
 
 
@@ -25,7 +26,7 @@ def as_csv(table):
     return out.getvalue()
 
 
-_LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{",
+_LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_\allowbreak{}", "{": r"\{",
           "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "≤": r"$\le$", "≥": r"$\ge$",
           "−": "$-$", "µ": r"\textmu{}", "×": r"$\times$", "<": r"$<$", ">": r"$>$", "∞": r"$\infty$", "–": "--", "|": r"\textbar{}", "✓": r"$\checkmark$", "°": r"\textdegree{}"}
 
@@ -43,9 +44,49 @@ def escape(text):
     return text.encode("ascii", "replace").decode() if not text.isascii() else text
 
 
+LINE = 104  # characters of a line of 174 mm in \footnotesize
+GAP = 3  # between two columns
+ROWS = 50  # of a page
+BROAD = 30  # a column of words that is broader than this is broken into lines
+
+
+def _columns(table):
+    """(specification, characters) of every column; those of words share what a line leaves them."""
+    longest = [max((len(str(row[k])) for row in [table.header, *table.rows]), default=0) for k in range(len(table.header))]
+    broad = [k for k in range(table.text_columns) if longest[k] > BROAD]
+    rest = sum(longest[:table.text_columns]) - sum(longest[k] for k in broad) + GAP * table.text_columns
+    room = max(LINE - rest - (16 if len(longest) > table.text_columns else 0), 10 * len(broad))
+    total = sum(longest[k] for k in broad)
+    if total > room:
+        for k in broad:
+            word = max((len(w) for row in [table.header, *table.rows] for w in re.split(r"[\s_-]+", str(row[k]))), default=0)
+            longest[k] = max(8, min(word + 1, BROAD), int(room * longest[k] / total))
+    wrapped = r">{\raggedright\arraybackslash}p{%.2f\linewidth}"
+    return [(wrapped % (n / (LINE + 4)) if k in broad else "l" if k < table.text_columns else "r", n) for k, n in enumerate(longest)]
+
+
+def _blocks(table, columns):
+    """Columns side by side that fit a line: every block begins with those of words."""
+    words = list(range(table.text_columns))
+    start = sum(columns[k][1] + GAP for k in words)
+    blocks, used = [[]], start
+    for k in range(table.text_columns, len(columns)):
+        if blocks[-1] and used + columns[k][1] + GAP > LINE:
+            blocks.append([])
+            used = start
+        blocks[-1].append(k)
+        used += columns[k][1] + GAP
+    return [words + block for block in blocks]
+
+
 def as_latex(table):
-    columns = "l" * table.text_columns + "r" * (len(table.header) - table.text_columns)
-    lines = [r"% needs \usepackage{booktabs}", rf"\begin{{tabular}}{{{columns}}}", r"\toprule",
-             " & ".join(escape(h) for h in table.header) + r" \\", r"\midrule"]
-    lines += [" & ".join(escape(c) for c in row) + r" \\" for row in table.rows]
-    return "\n".join(lines + [r"\bottomrule", r"\end{tabular}"]) + "\n"
+    """A booktabs table for a line of 174 mm; columns that do not fit follow below, with the words repeated."""
+    columns = _columns(table)
+    kind = "longtable" if len(table.rows) > ROWS else "tabular"
+    lines = [r"% needs \usepackage{array,booktabs,longtable}", r"{\footnotesize"]
+    for block in _blocks(table, columns):
+        lines += [rf"\begin{{{kind}}}{{@{{}}{''.join(columns[k][0] for k in block)}@{{}}}}", r"\toprule",
+                  " & ".join(escape(table.header[k]) for k in block) + r" \\", r"\midrule"]
+        lines += [" & ".join(escape(row[k]) for k in block) + r" \\" for row in table.rows]
+        lines += [r"\bottomrule", rf"\end{{{kind}}}", "", r"\medskip"]
+    return "\n".join(lines[:-2] + ["}"]) + "\n"

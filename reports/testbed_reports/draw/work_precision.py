@@ -44,19 +44,20 @@ def is_busy(run, cores):
 
 
 def costs_of(runs, entry, cores=None):
-    """([Cost], [runs without a number]) of the runs of one series, repeats taken together."""
-    found, lost = {}, []
+    """([Cost], [runs without a number]) of the runs of one series, repeats and seeds taken together: a setting of which one seed is lost
+    has no error."""
+    found = {}
     for run in runs:
         error, seconds = error_of(run, entry), run.value("solve_s")
-        if run.completed and math.isfinite(error) and seconds > 0:  # an error of zero is exact, not lost
-            key = tuple((k, str(v)) for k, v in run.values.items() if k not in ("repeat", "dt"))
-            found.setdefault(key, []).append((run, max(error, np.finfo(float).tiny), seconds))
-        else:
-            lost.append(run)
-    costs = []
+        key = tuple((k, str(v)) for k, v in run.values.items() if k not in ("repeat", "dt", "seed") and not k.endswith(".seed"))
+        found.setdefault(key, []).append((run, max(error, np.finfo(float).tiny), seconds))  # an error of zero is exact, not lost
+    costs, lost = [], []
     for same in found.values():
+        if not all(run.completed and math.isfinite(error) and seconds > 0 for run, error, seconds in same):
+            lost += [run for run, _, _ in same]
+            continue
         values = same[0][0].values
-        settings = {k: v for k, v in values.items() if k not in ("repeat", "dt", "L", "grid.cell_size", "case", "scene", "method", "variant", "seed")}
+        settings = {k: v for k, v in values.items() if k not in ("repeat", "dt", "L", "grid.cell_size", "case", "scene", "method", "variant", "seed") and not k.endswith(".seed")}
         times = [seconds for _, _, seconds in same]
         costs.append(Cost(values.get("L"), settings, float(np.mean([error for _, error, _ in same])), float(np.median(times)), min(times), max(times),
                           float(same[0][0].result.performance.get("dofs", math.nan)), any(is_busy(run, cores) for run, _, _ in same),

@@ -37,8 +37,9 @@ class Claim:
 
     @property
     def conditions(self):
-        """Under which it holds, of a claim that does not always."""
-        return [test.when for test in self.tests if test.verdict == "pass"] if self.verdict == "holds only if" else []
+        """Under which it holds, of a claim that does not always: all of them if they are few."""
+        held = [test.when for test in self.tests if test.verdict == "pass"] if self.verdict == "holds only if" else []
+        return held if len(held) <= 3 else [f"{len(held)} of {len(self.tests)} tests pass"]
 
 
 def _judge(study, entry):

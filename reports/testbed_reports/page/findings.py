@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from ..draw.drawing import name_of
 from ..draw.work_precision import ACCURACIES, cheapest, costs_of
 from ..grade import metrics
+from ..grade.limits import STEP_KEYS
 from ..grade.numbers import Number, number_of, taken
 from ..grade.targets import NOT_CONVERGING_ORDER, graded, in_sizes, number
 from .names import figure_anchor, figure_names, study_anchor, table_anchor
@@ -48,7 +49,7 @@ def _variants(runs):
 
 def _about(study, where, quantity, norm):
     """'stress l2, column' and the choice beside the methods, as far as there is one."""
-    choice = ", ".join(f"{k.rsplit('.', 1)[-1]} {v}" for k, v in where.items() if k not in BY_METHOD + ("case", "L"))
+    choice = ", ".join(f"{k.rsplit('.', 1)[-1]} {v}" for k, v in where.items() if k not in (*BY_METHOD, "case"))
     case = where.get("case") if isinstance(where.get("case"), str) else study.name
     return f"{words(quantity, norm)}, {case.replace('_', ' ')}" + (f" ({choice})" if choice else "")
 
@@ -138,6 +139,22 @@ def _values(study):
     return list(found.values())
 
 
+def _limits(study):
+    """Questions for what a search has found that is no time step, such as a factor of safety."""
+    found = {}
+    for limit in study.limits:
+        if limit.key in STEP_KEYS or limit.below is None:
+            continue
+        axes = ", ".join(f"{k.rsplit('.', 1)[-1]} {v:g}" if isinstance(v, float) else f"{k.rsplit('.', 1)[-1]} {v}" for k, v in limit.axes.items()
+                         if k not in BY_METHOD)
+        about = f"{study.case(limit.case).title}, {axes}"
+        question = found.setdefault(about, Question(f"Largest {limit.key.rsplit('.', 1)[-1]} that holds: {about}", about, "limit",
+                                                    f"{study_anchor(study)}-case-{limit.case}"))
+        low = limit.measured[0]
+        question.cells[limit.below.name] = Number(number(low, 4), (low,), study.name, "limit", "measured", "every", [limit.below.id])
+    return list(found.values())
+
+
 def _failures(studies):
     """The question how many runs diverged or are suspect."""
     question = Question("Runs that failed or are suspect, of all", "", "failures", "failures")
@@ -156,6 +173,7 @@ def questions(studies):
     slopes, reaches = {s.folder: _slopes(s) for s in plain}, {s.folder: _reaches(s) for s in plain}
     rows = [q for found in (slopes, reaches) for study in plain for q in found[study.folder]]
     rows += [q for study in plain if not slopes[study.folder] and not reaches[study.folder] for q in _values(study)]
+    rows += [q for study in studies if study.spec.cases for q in _limits(study)]
     return rows + ([_failures(studies)] if any(study.runs for study in studies) else [])
 
 

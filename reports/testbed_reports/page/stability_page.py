@@ -61,7 +61,7 @@ def verdicts_table(study):
     rows = [[r.id, r.values.get("case", ""), r.name, WORDS[r.verdict.level], str(int(r.verdict.silent)), str(int(r.verdict.warned)),
              r.verdict.cause, _since(r), r.verdict.held, r.command] for r in study.runs]
     header = ["run", "case", "method", "verdict", "silent", "warned", "cause", "since", "held", "command"]
-    return Table("runs", "Runs and their verdicts", header, rows, len(header))
+    return Table("runs", "Runs and their verdicts", header, rows, len(header), folded=True)
 
 
 def stability_section(study, style, out, prefix):
