@@ -222,11 +222,11 @@ def picture(tmp_path, group, **common):
 
 
 def test_strain_about_an_inclusion(tmp_path):
-    """One point of the second row from below is the inclusion; a strain of 3 in the lowest row and of 1 in the highest, 0 between."""
-    body, strain = np.zeros(16), np.array([3.0] * 4 + [0.0] * 8 + [1.0] * 4)
+    """One point of the second row from below is the inclusion; a strain of 3 in the lowest row, of 1 at three points of the highest."""
+    body, strain = np.zeros(16), np.array([3.0] * 4 + [0.0] * 9 + [1.0] * 3)
     body[5] = 1
     rows = picture(tmp_path, "inclusion", fields={"body": body, "plastic_shear_strain": strain})
-    assert rows == {("strain_share", "below"): pytest.approx(0.75), ("strain_share", "above"): pytest.approx(0.25)}
+    assert rows == {("strain_share", "below"): pytest.approx(0.8), ("strain_share", "above"): pytest.approx(0.2)}
 
 
 def test_what_has_passed_a_door(tmp_path):
