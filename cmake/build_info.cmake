@@ -11,7 +11,7 @@ namespace testbed
 {
 const Build& build()
 {
-    static const Build b{\"${commit}\", \"${COMPILER}\", \"${FLAGS}\", \"${BUILD_TYPE}\"};
+    static const Build b{\"${VERSION}\", \"${commit}\", \"${COMPILER}\", \"${FLAGS}\", \"${BUILD_TYPE}\"};
     return b;
 }
 }  // namespace testbed

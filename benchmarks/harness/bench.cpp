@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <fstream>
@@ -81,11 +82,18 @@ std::vector<std::string> settings(const std::string& law, double points)
     return {fmt::format("grid.cell_size={:.17g}", L), fmt::format("time.dt={:.17g}", 5e-4 * L)};
 }
 
+/// Where the cases are: beside an installed program, else in the sources.
+std::filesystem::path cases()
+{
+    const auto installed = std::filesystem::read_symlink("/proc/self/exe").parent_path() / INSTALLED;
+    return std::filesystem::exists(installed) ? installed : std::filesystem::path(BENCHMARKS);
+}
+
 Measurement measure(const std::string& method, const std::string& law, double points, int team, double seconds)
 {
     set_threads(team);
     const Stopwatch setup;
-    const std::string scene_path = std::string(BENCHMARKS) + (law == "elastic" ? "/elastic/speed/scene.toml" : "/soil/cliff/scene.toml");
+    const std::string scene_path = (cases() / (law == "elastic" ? "elastic/speed/scene.toml" : "soil/cliff/scene.toml")).string();
     const Scene scene = load_scene(scene_path, method, settings(law, points)).scene;
     const std::unique_ptr<Solver> solver = method_of(scene).make(scene);
     Measurement m;

@@ -7,7 +7,7 @@ namespace testbed
 {
 struct Build
 {
-    const char *commit, *compiler, *flags, *type;
+    const char *version, *commit, *compiler, *flags, *type;
 };
 /// Made by the build itself.
 const Build& build();

@@ -33,6 +33,7 @@ std::string ending(const Outcome& out)
 
 void write_provenance(ResultFile& file)
 {
+    file.attribute("/provenance", "version", std::string(build().version));
     file.attribute("/provenance", "commit", std::string(build().commit));
     file.attribute("/provenance", "compiler", std::string(build().compiler));
     file.attribute("/provenance", "flags", std::string(build().flags));

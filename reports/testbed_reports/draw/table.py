@@ -28,7 +28,8 @@ def as_csv(table):
 
 _LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_\allowbreak{}", "{": r"\{",
           "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "≤": r"$\le$", "≥": r"$\ge$",
-          "−": "$-$", "µ": r"\textmu{}", "×": r"$\times$", "<": r"$<$", ">": r"$>$", "∞": r"$\infty$", "–": "--", "|": r"\textbar{}", "✓": r"$\checkmark$", "°": r"\textdegree{}"}
+          "−": "$-$", "µ": r"\textmu{}", "×": r"$\times$", "<": r"$<$", ">": r"$>$", "∞": r"$\infty$", "–": "--", "|": r"\textbar{}", "✓": r"$\checkmark$", "°": r"\textdegree{}",
+          "†": r"$\dagger$", "±": r"$\pm$", "²": "$^2$", "τ": r"$\tau$", "√": r"$\surd$", "…": r"\ldots{}"}
 
 
 def escape(text):
@@ -55,7 +56,8 @@ def _columns(table):
     longest = [max((len(str(row[k])) for row in [table.header, *table.rows]), default=0) for k in range(len(table.header))]
     broad = [k for k in range(table.text_columns) if longest[k] > BROAD]
     rest = sum(longest[:table.text_columns]) - sum(longest[k] for k in broad) + GAP * table.text_columns
-    room = max(LINE - rest - (16 if len(longest) > table.text_columns else 0), 10 * len(broad))
+    numbers = sum(n + GAP for n in longest[table.text_columns:])
+    room = max(LINE - rest - min(numbers, 2 * LINE // 3), 10 * len(broad))
     total = sum(longest[k] for k in broad)
     if total > room:
         for k in broad:

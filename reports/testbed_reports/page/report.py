@@ -16,11 +16,14 @@ from ..grade.loose import study_of
 from ..grade.targets import judge_all
 from ..read.study_file import StudyError
 from . import bench, findings
+from .against import moved_table
 from .ledger import Ledger
 from .names import slug
 from .page import inline_svg, render
+from .paper import write_paper
+from .references import references
 from .study_section import PRINT, study_section, write_table
-from .tables import claims_table, targets_table
+from .tables import claims_table, questions_table, targets_table
 
 
 def find_studies(folders):
@@ -174,9 +177,9 @@ def _first_screen(studies, sections, claims, verdicts, ledger):
             "which": list(dict.fromkeys(f"{run.name} ({run.values.get('case') or name})" for name, run in bad))}
 
 
-def build(folders, out, command, unreadable=None):
+def build(folders, out, command, unreadable=None, against=None):
     """Writes the report of studies into the folder `out`; returns the path of the page. `unreadable`: a list for what could not be read or
-    made."""
+    made; `against`: a folder of studies to compare with."""
     out, folders, failures, ledger = Path(out), [Path(folder) for folder in folders], [], Ledger()
     unreadable = [] if unreadable is None else unreadable
     studies = _read(folders, failures, unreadable)
@@ -201,11 +204,19 @@ def build(folders, out, command, unreadable=None):
                  e.get("reason", "")] for s in studies for e in s.left_out]
     titles = [section["title"] for section in sections]
     title = titles[0] if len(titles) == 1 else "Testbed report"
+    moved = moved_table(studies, [read_study_folder(folder) for folder in find_studies([against])]) if against else None
+    if moved:
+        write_table(out, "report", moved)
+    write_atomically(out / "references.bib", references(studies))
     first = _first_screen(studies, sections, judged_claims, flat, ledger)
+    if first["matrix"]:
+        write_table(out, "report", questions_table(first))
+    write_paper(out, title, first, list(zip([study.name for study in studies], sections)),
+                [f"report_{name}" for name, there in (("questions", first["matrix"]), ("claims", claims)) if there])
     write_atomically(out / "numbers.csv", as_csv(ledger.table()))
     gallery = _write_gallery(out, title, sections)
     page = render("template.html", title=title, gallery=gallery, provenance=rows, warnings=warnings, first=first, claims=claims,
-                  studies=sections, verdicts=[(study.name, v) for study, v in flat], numbers=ledger.table(),
+                  studies=sections, verdicts=[(study.name, v) for study, v in flat], numbers=ledger.table(), moved=moved, against=against,
                   failures=Table("failures", "Failures", ["study", "what", "status", "reason"], failures, 4),
                   left_out=Table("left_out", "Left out", ["study", "variant", "combination", "reason"], left_out, 4))
     write_atomically(out / "report.html", page)
@@ -218,6 +229,7 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(prog="testbed report", description="Page, figures and tables of studies, or of results.")
     parser.add_argument("folders", nargs="+", metavar="DIR", help="a study's folder, a folder of such, or a result file")
     parser.add_argument("-o", "--output", metavar="OUT", help="default: 'report' beside the first DIR")
+    parser.add_argument("--against", metavar="DIR", help="studies of before: what moved beyond the range of its repeats")
     try:
         options = parser.parse_args(arguments)
     except SystemExit as stop:
@@ -225,7 +237,7 @@ def main(arguments=None):
     out = Path(options.output) if options.output else Path(options.folders[0]).resolve().parent / "report"
     unreadable = []
     try:
-        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]), unreadable)
+        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]), unreadable, options.against)
     except (StudyError, OSError) as error:
         print(f"testbed report: {error}", file=sys.stderr)
         return 1

@@ -189,6 +189,12 @@ def targets_table(verdicts):
                  [[v.label, v.asked, v.measured, v.verdict, v.note, v.source] for v in verdicts], 6)
 
 
+def questions_table(first):
+    """The matrix of the first screen."""
+    rows = [[row["text"], *(c["piece"] if isinstance(c["piece"], str) else c["piece"][1].text for c in row["cells"])] for row in first["matrix"]]
+    return Table("questions", "Questions by method", ["question", *first["variants"]], rows)
+
+
 def claims_table(claims):
     """Every test of every claim, for other programs."""
     def plain(pieces):

@@ -1,0 +1,91 @@
+"""`testbed import`: whether a result of another code can be used, what it lacks, and into which study it goes."""
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from ..grade import metrics
+from ..grade.dataset import OWN_RUN
+from ..read.results import Result, ResultError
+
+# What a report shows of a run, beside its metrics: attributes or fields, and what goes without them.
+WANTED = {"performance": {"solve_s": "error against run time", "particle_steps_per_second": "the table of performance", "bytes_per_point": "the table of performance",
+                          "dofs": "error against unknowns"},
+          "provenance": {"commit": "where the numbers come from", "cpu": "where the numbers come from", "threads": "where the numbers come from"},
+          "fields": {"position": "maps", "displacement": "maps and errors", "stress": "maps, profiles and errors", "initial_position": "maps and shear bands",
+                     "initial_volume": "every norm", "volume": "fronts and areas"}}
+STRAIN = {"shear_band", "shear_layer", "inclusion"}  # groups that need plastic_shear_strain
+
+
+def _lacks(result):
+    """Sentences on what is not there, and what goes without it."""
+    told = [f"/performance lacks {name}: no {what}" for name, what in WANTED["performance"].items() if name not in result.performance]
+    told += [f"/provenance lacks {name}: the page does not say {what}" for name, what in WANTED["provenance"].items() if name not in result.provenance]
+    if not result.snapshots:
+        return told + ["no snapshots: no maps, profiles and norms"]
+    told += [f"the last snapshot lacks {name}: no {what}" for name, what in WANTED["fields"].items() if name not in result.final]
+    if STRAIN & set(result.metrics) and "plastic_shear_strain" not in result.final:
+        told.append("the last snapshot lacks plastic_shear_strain: no shear bands")
+    if not result.metrics:
+        told.append("/scene names no metrics: nothing is graded (copy the attribute from a run of the same case)")
+    return told
+
+
+def _shapes(result):
+    """Sentences on arrays whose sizes or values cannot be."""
+    told, sizes = [], {}
+    for name in sorted(result.final.fields) if result.snapshots else []:
+        values = result.final[name]
+        sizes.setdefault(len(values), []).append(name)
+        if not np.isfinite(values).all():
+            told.append(f"the last snapshot's {name} is not finite everywhere")
+    if len(sizes) > 1:
+        told.append("fields of the last snapshot differ in their number of points: " + "; ".join(f"{', '.join(names)}: {n}" for n, names in sizes.items()))
+    return told
+
+
+def examine(path):
+    """(what it is, wrong, lacking): wrong sentences keep it from being used. Raises ResultError."""
+    result = Result(path)
+    what = f"{result.variant} on {result.case}, {result.status}, L = {result.cell_size:g} m, {len(result.snapshots)} snapshots"
+    grades = metrics.grade(result)
+    numbers = [" ".join(key).strip() for key, value in grades.rows.items() if key[0] not in metrics.ALWAYS and np.isfinite(value)]
+    what += f"; graded: {', '.join(numbers)}" if numbers else "; nothing graded"
+    missing = [f"not graded: {error}" for error in grades.errors if "/performance" not in error]
+    return what, _shapes(result), _lacks(result) + missing
+
+
+def main(arguments=None):
+    """Entry of `testbed import`; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="testbed import", description="Check a result file of another code, and put it into a study.")
+    parser.add_argument("result", metavar="RESULT.h5")
+    parser.add_argument("--study", metavar="DIR", help="the folder of a study that was run: the file is copied to DIR/runs/NAME/result.h5")
+    parser.add_argument("--name", help="default: the file's name")
+    try:
+        options = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
+    except SystemExit as stop:
+        return 1 if stop.code else 0
+    name = options.name or Path(options.result).stem
+    try:
+        what, wrong, lacking = examine(options.result)
+        print(f"{options.result}: {what}")
+        for sentence in lacking:
+            print(f"  lacks: {sentence}")
+        if wrong:
+            raise ResultError("\n".join(wrong))
+        if options.study:
+            folder = Path(options.study)
+            if not (folder / "study.toml").is_file():
+                raise ResultError(f"{folder}: no folder of a study (no study.toml)")
+            if OWN_RUN.search(name[-14:]) or "/" in name:
+                raise ResultError(f"--name {name}: must be a file's name and not end as those of the study's own runs")
+            home = folder / "runs" / name
+            home.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(options.result, home / "result.h5")
+            print(f"{home / 'result.h5'}")
+    except (ResultError, OSError) as error:
+        print(f"testbed import: {error}", file=sys.stderr)
+        return 1
+    return 0

@@ -1,0 +1,122 @@
+"""What a paper needs: an installed program, references, a paper, what moved since before, results of other codes."""
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import pytest
+from conftest import REPORTS
+from synthetic import write_result, write_study
+from testbed_reports.draw.table import escape
+from testbed_reports.page.report import build, main
+from testbed_reports.study.outside import main as bring
+
+TESTBED = os.environ.get("TESTBED", "")
+ROOT = REPORTS.parent
+BUILT = pytest.mark.skipif(not TESTBED, reason="no executable")
+
+
+@BUILT
+def test_installed_program_needs_no_sources(tmp_path):
+    """Installed to a prefix, it runs a case, reports on it and draws it; nothing of it is asked from the folder of the sources."""
+    build_folder = Path(TESTBED).resolve().parents[1]
+    done = subprocess.run(["cmake", "--install", build_folder, "--prefix", tmp_path / "prefix"], capture_output=True, text=True)
+    if done.returncode and "testbed-fem" in done.stderr:
+        pytest.skip("the FEM reference is configured and not built")
+    assert done.returncode == 0, done.stderr
+    share = tmp_path / "prefix" / "share" / "testbed"
+    environment = {"PATH": f"{tmp_path / 'prefix' / 'bin'}:/usr/bin:/bin", "HOME": str(tmp_path)}
+
+    def run(*command):
+        done = subprocess.run(["testbed", *command], cwd=tmp_path, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, (command, done.stderr)
+        return done.stdout + done.stderr
+
+    assert re.match(r"testbed \d+\.\d+\.\d+ \(", run("--version"))
+    scene = share / "benchmarks" / "elastic" / "elastic_column" / "scene.toml"
+    run("run", scene, "--set", "grid.cell_size=2.0", "-o", "r.h5", "--quiet")
+    run("report", "r.h5", "-o", "page")
+    run("plot", "r.h5", "-o", "r.png")
+    assert "lpfdm on elastic_column" in run("import", "r.h5")
+    (tmp_path / "s.toml").write_text(f'title = "s"\nscene = "{scene}"\n[axes]\n"grid.cell_size" = [2.0]\n')
+    run("study", "s.toml", "-o", "studies")
+    text = "".join(path.read_text(errors="ignore") for path in (tmp_path / "prefix").rglob("*") if path.is_file() and path.suffix in (".py", ".toml", ".html"))
+    assert str(ROOT) not in text
+
+
+def test_paper(tmp_path):
+    folder = write_study(tmp_path / "column", '[[figure]]\nkind = "convergence"\nquantity = "stress"\nnorm = "l2"\ncaption = "50 % of a_b & more."\n',
+                         sizes=(1.0, 0.5), metrics="stress")
+    out = build([folder], tmp_path / "out", "testbed report column").parent
+    text = (out / "paper.tex").read_text()
+    assert text.isascii() and r"\input{tables/report_questions}" in text and r"50 \% of a\_\allowbreak{}b \& more" in text
+    for name in re.findall(r"\\includegraphics\[[^]]*\]\{(.*?)\}", text):
+        assert (out / "figures" / f"{name}.pdf").is_file()
+    for name in re.findall(r"\\input\{(.*?)\}", text):
+        assert (out / f"{name}.tex").is_file()
+    bib = (out / "references.bib").read_text()
+    assert "konagai2000" in bib and "sulsky1994" in bib and "griffiths1999" not in bib
+    if shutil.which("latexmk") and shutil.which("bibtex"):
+        done = subprocess.run(["latexmk", "-pdf", "-interaction=nonstopmode", "paper.tex"], cwd=out, capture_output=True, text=True)
+        log = (out / "paper.log").read_text(errors="ignore")
+        assert done.returncode == 0, log[-2000:]
+        assert not [float(n) for n in re.findall(r"Overfull \\hbox \(([\d.]+)pt", log) if float(n) > 1]
+
+
+def test_words_for_latex():
+    assert escape("† ± ² τ") == r"$\dagger$ $\pm$ $^2$ $\tau$" and escape("…") == r"\ldots{}"
+
+
+def test_what_moved(tmp_path, capsys):
+    """One run has another error, one is new; times of repeats overlap."""
+    old = write_study(tmp_path / "old" / "column", sizes=(2.0, 1.0), metrics="stress", repeats=2)
+    new = write_study(tmp_path / "new" / "column", sizes=(2.0, 1.0), metrics="stress", repeats=2,
+                      change=lambda v, L, r: {"stress_error": 0.5} if (v, L) == ("lpfdm", 1.0) else {"solve_s": 1.05 * L**-3 * (1 + 0.1 * r)} if v == "lpfdm" else {})
+    page = build([new], tmp_path / "out", "c", against=old.parent).read_text()
+    part = re.sub(r"<[^>]+>", " ", page[page.index('id="moved"'):page.index('id="failures"')])
+    assert "stress l2" in part and "lpfdm" in part and "mpm-linear" not in part and "solve" not in part
+    same = build([old], tmp_path / "same", "c", against=old).read_text()
+    assert "Nothing: every number lies within" in same
+    assert main([str(new), "-o", str(tmp_path / "x"), "--against", str(tmp_path / "none")]) == 1
+    assert "no such folder" in capsys.readouterr().err
+
+
+def test_import_says_what_lacks(tmp_path, capsys):
+    path = write_result(tmp_path / "mine.h5", variant="my-code", sealed=False)
+    with h5py.File(path, "a") as file:
+        del file["performance"].attrs["solve_s"]
+    assert bring([str(path)]) == 0
+    told = capsys.readouterr().out
+    assert "my-code on column, completed" in told and "stress l2" in told and "/performance lacks solve_s: no error against run time" in told
+    with h5py.File(path, "a") as file:
+        name = f"snapshots/{sorted(file['snapshots'])[-1]}/stress"
+        values = file[name][()]
+        del file[name]
+        file[name] = values[:-1]
+    assert bring([str(path)]) == 1
+    assert "differ in their number of points" in capsys.readouterr().err
+
+
+def test_import_into_a_study(tmp_path, capsys):
+    folder = write_study(tmp_path / "column", sizes=(2.0, 1.0), metrics="stress")
+    path = write_result(tmp_path / "mine.h5", variant="my-code")
+    assert bring([str(path), "--study", str(folder), "--name", "mine"]) == 0
+    page = build([folder], tmp_path / "out", "c").read_text()
+    assert "my-code" in page and "of another code" in page
+    for bad in (["--study", str(tmp_path)], ["--study", str(folder), "--name", "x_0123abcd-0123"], ["--study", str(folder), "--name", "../x"]):
+        assert bring([str(path), *bad]) == 1
+    assert bring([str(tmp_path / "none.h5")]) == 1 and bring([]) == 1
+    assert "Traceback" not in capsys.readouterr().err
+
+
+@BUILT
+def test_worked_example(tmp_path):
+    """docs/examples/outside_result.py, as its text says."""
+    scene = ROOT / "benchmarks" / "elastic" / "elastic_column" / "scene.toml"
+    subprocess.run([TESTBED, "run", scene, "--set", "grid.cell_size=2.0", "-o", "r.h5", "--quiet"], cwd=tmp_path, check=True)
+    subprocess.run([sys.executable, ROOT / "docs" / "examples" / "outside_result.py", "r.h5", "mine.h5"], cwd=tmp_path, check=True)
+    done = subprocess.run([TESTBED, "import", "mine.h5"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0 and "my-code on elastic_column" in done.stdout and "displacement l2" in done.stdout, done.stderr
