@@ -68,7 +68,7 @@ paper = "Nothing comes of nothing."
 """
 
 
-PAGES = [("report.html", 9), ("gallery.html", 1)]  # and their pictures
+PAGES = [("report.html", 2), ("gallery.html", 1)]  # and their pictures
 
 
 def change(variant, L, repeat):
@@ -103,7 +103,8 @@ def page(report):
 
 
 def text_of(page):
-    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", re.sub(r"<style>.*?</style>", "", page, flags=re.S)))
+    page = re.sub(r"<(style|script|svg)\b.*?</\1>", "", page, flags=re.S)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page))
 
 
 def test_figures_for_print(report):
@@ -132,8 +133,9 @@ class Balance(HTMLParser):
 @pytest.mark.parametrize("name, pictures", PAGES)
 def test_pages_stand_alone(report, name, pictures):
     page = (report / name).read_text()
-    rest = re.sub(r"data:[^\"']*", "", page)
-    assert not re.search(r"https?://|file://|<script|<link(?![^>]*href=\"\")|@import|url\(", rest)
+    rest = re.sub(r"data:[^\"']*", "", re.sub(r"<script.*?</script>", "", page, flags=re.S))
+    rest = re.sub(r'xmlns(:\w+)?="[^"]*"|url\(#\w+\)', "", re.sub(r"<metadata>.*?</metadata>", "", rest, flags=re.S))
+    assert not re.search(r"https?://|file://|<link(?![^>]*href=\"\")|@import|url\(", rest) and not re.search(r"<script[^>]*src", page)
     assert len(re.findall(r'<img src="data:image/svg\+xml;base64,', page)) == pictures
     Balance(page)
 
@@ -291,3 +293,45 @@ def test_in_a_browser(report, tmp_path, name, pictures):
     picture = tmp_path / "page.png"
     subprocess.run([*options, f"--screenshot={picture}", (report / name).as_uri()], capture_output=True, timeout=50)
     assert picture.stat().st_size > 20000
+
+
+PROBE = """<script>addEventListener('load', () => {
+  const told = [], figure = [...document.querySelectorAll('figure')].find(f => f.querySelector('script'));
+  const canvas = figure.querySelector('.canvas'), svg = canvas.querySelector('svg'), tip = document.querySelector('.tip');
+  const point = JSON.parse(figure.querySelector('script').textContent)[0];
+  canvas.scrollIntoView();
+  const box = svg.getBoundingClientRect();
+  const at = {clientX: box.left + point.x * box.width, clientY: box.top + point.y * box.height, bubbles: true};
+  canvas.dispatchEvent(new PointerEvent('pointermove', at));
+  told.push('hover ' + tip.classList.contains('shown') + tip.textContent.includes(point.run));
+  const buttons = [...figure.querySelectorAll('.tools button')], series = buttons.find(b => b.className === 'series');
+  buttons[0].click();
+  told.push('zoom ' + svg.style.transform.includes('scale(1.6)'));
+  buttons[2].click();
+  told.push('whole ' + svg.style.transform.includes('scale(1)'));
+  series.click();
+  told.push('off ' + (canvas.querySelectorAll('.off').length > 0));
+  series.click();
+  told.push('on ' + canvas.querySelectorAll('.off').length);
+  const table = document.querySelector('#failures ~ .wide table'), head = table.querySelectorAll('th')[1];
+  head.click();
+  const column = [...table.tBodies[0].rows].map(row => row.cells[1].textContent);
+  told.push('sorted ' + (column.length > 2 && column.join() === [...column].sort().join()));
+  canvas.dispatchEvent(new MouseEvent('click', at));
+  told.push('run ' + (location.hash === '#run-' + point.run) + document.getElementById('run-' + point.run).closest('details').open);
+  told.push('pictures ' + [...document.querySelectorAll('.canvas svg')].every(s => s.clientWidth > 100 && s.clientHeight > 50));
+  document.title = told.join(', ');
+});</script>"""
+
+
+@pytest.mark.skipif(not shutil.which("chromium"), reason="chromium is not installed")
+@pytest.mark.parametrize("window", ["1400,1000", "420,900"])
+def test_hover_zoom_sort(report, tmp_path, window):
+    """A point tells of its run and leads to it, a figure grows and shrinks, a series goes and comes, a table is sorted."""
+    copy = tmp_path / "copy.html"
+    copy.write_text((report / "report.html").read_text().replace("</body>", PROBE + "</body>"))
+    done = subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0", f"--user-data-dir={tmp_path / 'profile'}",
+                           f"--window-size={window}", "--dump-dom", copy.as_uri()], capture_output=True, text=True, timeout=50)
+    title = re.search(r"<title>(.*?)</title>", done.stdout).group(1)
+    assert title == "hover truetrue, zoom true, whole true, off true, on 0, sorted true, run truetrue, pictures true"
+    assert "CONSOLE" not in done.stderr

@@ -26,6 +26,11 @@ RC = {"font.size": 8, "font.family": "DejaVu Sans", "axes.labelsize": 8, "axes.t
       "pdf.fonttype": 42, "svg.hashsalt": "testbed", "axes.axisbelow": True}
 
 
+def gid_of(label):
+    """The name of a series in a picture, by which a page finds its lines."""
+    return f"series:{label}"
+
+
 class Style:
     """Gives each label its colour, marker and line; the set of labels decides, so give all of a report at once."""
 
@@ -57,7 +62,8 @@ class Style:
 
     def of(self, label):
         return {"color": self.colour(label), "marker": self.marker(label), "linestyle": self.line(label),
-                "markerfacecolor": "white" if self.slot(label) % 2 else self.colour(label), "markeredgewidth": 0.9}
+                "markerfacecolor": "white" if self.slot(label) % 2 else self.colour(label), "markeredgewidth": 0.9,
+                "gid": gid_of(label)}
 
 
 def _family_order(label):

@@ -1,9 +1,12 @@
 """The self-contained pages: templates, inline figures, inline style."""
 import base64
 import io
+import re
 from pathlib import Path
 
 import jinja2
+
+from ..draw.style import plt
 
 
 def inline_svg(figure):
@@ -11,6 +14,25 @@ def inline_svg(figure):
     out = io.BytesIO()
     figure.savefig(out, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
     return "data:image/svg+xml;base64," + base64.b64encode(out.getvalue()).decode()
+
+
+_NAMED = re.compile(r' id="(?!series:)[A-Za-z]\w*_\d+"')  # of groups that nothing refers to
+_SERIES = re.compile(r' id="series:([^"]*)"')
+
+
+def live_svg(figure, name):
+    """The figure as an element of the page: its series carry their names, and what it refers to by an id is its own."""
+    out = io.BytesIO()
+    with plt.rc_context({"svg.hashsalt": name}):
+        figure.savefig(out, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
+    text = out.getvalue().decode()
+    text = _NAMED.sub("", text[text.index("<svg"):])
+    return _SERIES.sub(lambda m: f' data-series="series:{m[1]}" data-label="{m[1]}"', text)
+
+
+def scripts():
+    """The library and what the page does with it, as text."""
+    return [Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("d3.min.js", "interactive.js")]
 
 
 def render(template, autoescape=True, **content):

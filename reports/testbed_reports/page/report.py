@@ -19,7 +19,7 @@ from . import bench, findings
 from .against import moved_table
 from .ledger import Ledger
 from .names import slug
-from .page import inline_svg, render
+from .page import inline_svg, live_svg, render, scripts
 from .paper import write_paper
 from .references import references
 from .study_section import PRINT, study_section, write_table
@@ -103,7 +103,7 @@ def _bench_section(path, style, out, ledger, failures):
         figure = bench.rates_figure(rows, style)
         figure.savefig(out / "figures" / f"{own}_rates.pdf", **PRINT)
         caption = f"Fastest of ten slices; full lines one thread, thin lines more. {comment}. Made by: testbed bench"
-        shown = {"title": "Particle-steps per second against the number of points", "image": inline_svg(figure), "error": "", "width": "page",
+        shown = {"title": "Particle-steps per second against the number of points", "image": inline_svg(figure), "svg": live_svg(figure, own), "points": [], "error": "", "width": "page",
                  "rem": 62, "anchor": f"figure-{own}_rates", "paper": "", "shows": [], "caption": [caption], "runs": []}
     plt.close("all")
     tables = [t for t in (bench.rates_table(rows), bench.cost_table(rows)) if t]
@@ -217,6 +217,7 @@ def build(folders, out, command, unreadable=None, against=None):
     gallery = _write_gallery(out, title, sections)
     page = render("template.html", title=title, gallery=gallery, provenance=rows, warnings=warnings, first=first, claims=claims,
                   studies=sections, verdicts=[(study.name, v) for study, v in flat], numbers=ledger.table(), moved=moved, against=against,
+                  scripts=scripts(),
                   failures=Table("failures", "Failures", ["study", "what", "status", "reason"], failures, 4),
                   left_out=Table("left_out", "Left out", ["study", "variant", "combination", "reason"], left_out, 4))
     write_atomically(out / "report.html", page)

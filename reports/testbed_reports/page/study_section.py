@@ -3,12 +3,13 @@ from collections import Counter
 
 from ..draw.drawing import FigureError
 from ..draw.figures import draw
+from ..draw.points import points_of
 from ..draw.style import RC, WIDTH, plt
 from ..draw.table import as_csv, as_latex
 from ..grade.dataset import write_atomically
 from ..read.results import ResultError
 from .names import figure_anchor, figure_names, slug, study_anchor, subject, table_anchor
-from .page import inline_svg
+from .page import inline_svg, live_svg
 from .stability_page import stability_section
 from .tables import study_tables
 
@@ -33,13 +34,14 @@ def _figure(study, entry, name, style, out, ledger, failures):
     what = subject(entry)
     title = entry.get("title") or f"{entry['kind']}: {what} {entry.get('norm', '')}".replace("_", " ").strip()
     shown = {"title": title[:1].upper() + title[1:], "kind": entry["kind"], "image": "", "caption": [],
-             "error": "", "width": "column", "rem": 0, "runs": [],
+             "svg": "", "points": [], "error": "", "width": "column", "rem": 0, "runs": [],
              "anchor": figure_anchor(name), "paper": entry.get("paper", "").strip(), "shows": ledger.text(study, entry.get("shows", "").strip())}
     try:
         with plt.rc_context(RC):
             drawing = draw(study, entry, style)
             drawing.figure.savefig(out / "figures" / f"{name}.pdf", **PRINT)
-            shown["image"] = inline_svg(drawing.figure)
+            shown["image"], shown["svg"] = inline_svg(drawing.figure), live_svg(drawing.figure, name)
+            shown["points"] = points_of(drawing, entry)
             inches = drawing.figure.get_figwidth()
             shown["width"], shown["rem"] = "page" if inches > 1.05 * WIDTH["column"] else "column", round(62 / 7 * inches, 1)
             shown["caption"] = _caption(study, entry, drawing, ledger)
