@@ -15,7 +15,7 @@ QUANTITY_NAMES = {
     ("stress", "l1_yy"): r"Vertical stress error, $L_1$", ("displacement", "l2"): "Displacement error, $L_2$",
     ("displacement", "linf"): r"Displacement error, $L_\infty$",
     ("displacement", "rms_scaled"): "Displacement error, scaled RMS",
-    ("strain_share", "below"): "Share of plastic strain below the inclusion", ("strain_share", "above"): "Share of plastic strain above the inclusion",
+    ("limit", "measured"): "Largest value that holds", ("strain_share", "below"): "Share of plastic strain below the inclusion", ("strain_share", "above"): "Share of plastic strain above the inclusion",
     ("passed", "area"): "Area that has passed [m$^2$]", ("passed", "depth"): "Depth below the door [m]",
     ("uplift", "area"): "Area of uplift [m$^2$]", ("uplift", "bump"): "Highest bump / $L$",
     ("curve", "secant"): "Stiffness to the peak / initial", ("curve", "roughness"): "Scatter of the load after the peak [Pa]",

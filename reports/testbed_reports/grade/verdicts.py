@@ -8,6 +8,7 @@ from ..read.study_file import matches, same
 from .stability_metrics import first_time
 
 LEVELS = ("sound", "wrong", "failed")
+HOLDS = {"sound": "holds", "wrong": "does not hold", "failed": "failed"}  # of a case that is a condition
 WORDS = {"sound": "sound", "wrong": "bounded but wrong", "failed": "failed"}
 CAUSES = {"time_step": "time step beyond the limit", "sliver": "node with little mass", "null_mode": "null mode", "tension": "tension",
           "locking": "locking", "separation": "numerical separation", "crossing": "points crossing cells"}
@@ -119,6 +120,8 @@ def judge_study(study):
     for run in study.runs:
         case = cases.get(run.values.get("case"))
         run.verdict = judge_run(run, case.bounds if case else [])
+        if case and case.condition:
+            run.verdict.silent = run.verdict.warned = False
     by_case = {}
     for run in study.runs:
         by_case.setdefault(run.values.get("case"), []).append(run)

@@ -6,7 +6,7 @@ from ..draw import matrix
 from ..draw.style import RC, plt
 from ..draw.table import Table
 from ..grade.targets import number
-from ..grade.verdicts import WORDS
+from ..grade.verdicts import HOLDS, WORDS
 from . import failures
 from .page import inline_svg
 
@@ -23,7 +23,7 @@ def _cell(cell, value):
 
 def _matrices(matrices, variants):
     return [{"name": m.case.name, "title": m.case.title, "purpose": m.case.purpose, "parameter": m.parameter,
-             "readme": Path(m.case.scene).parent.name, "bounds": matrix.bounds_text(m.case, variants),
+             "readme": f"{Path(m.case.scene).parent.parent.name}/{Path(m.case.scene).parent.name}", "asked": "Holds while" if m.case.condition else "Sound", "bounds": matrix.bounds_text(m.case, variants),
              "columns": [matrix.value_text(v) for v in m.values],
              "rows": [{"method": method, "cells": [_cell(c, v) for c, v in zip(m.cells[method], m.values)]} for method in m.methods]}
             for m in matrices]
@@ -38,7 +38,7 @@ def _told(run, case):
     v = run.verdict
     axes = ", ".join(f"{k.rsplit('.', 1)[-1]} = {run.values[k]:g}" if isinstance(run.values[k], float) else f"{k.rsplit('.', 1)[-1]} = {run.values[k]}"
                      for k in case.axis_keys if k in run.values and k != "method")
-    words = "sound-but-wrong" if v.silent else WORDS[v.level]
+    words = "sound-but-wrong" if v.silent else (HOLDS if case.condition else WORDS)[v.level]
     return {"anchor": anchor(run), "case": case.title, "method": run.name, "axes": axes, "kind": matrix.kind_of(v), "verdict": words,
             "warned": v.warned, "cause": v.cause, "since": _since(run), "held": v.held, "beyond": "; ".join(v.beyond), "command": run.command}
 

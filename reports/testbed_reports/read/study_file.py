@@ -6,7 +6,7 @@ from pathlib import Path
 from .combinations import expand_axes
 from .figure_tables import read_figures
 from .number_tables import check_texts, read_claims, read_numbers
-from .study_reader import LIST, NUMBER, TABLE, TEXT, Reader, StudyError
+from .study_reader import FLAG, LIST, NUMBER, TABLE, TEXT, Reader, StudyError
 from .spelling import did_you_mean
 from .values import flatten, matches, same, toml_value  # noqa: F401 (offered here to others)
 
@@ -14,7 +14,7 @@ STUDY_KEYS = {"title": TEXT, "purpose": TEXT, "scene": TEXT, "repeats": (int,), 
               "axes": TABLE, "exclude": LIST, "override": LIST, "case": LIST, "failure": LIST, "remedy": LIST, "target": LIST, "figure": LIST,
               "number": LIST, "claim": LIST}
 CASE_KEYS = {"name": TEXT, "title": TEXT, "scene": TEXT, "purpose": TEXT, "parameter": TEXT, "set": TABLE, "axes": TABLE,
-             "exclude": LIST, "override": LIST, "bound": LIST}
+             "exclude": LIST, "override": LIST, "bound": LIST, "condition": FLAG}
 BOUND_KEYS = {"quantity": TEXT, "norm": TEXT, "min": NUMBER, "max": NUMBER, "failed": NUMBER, "where": TABLE, "source": TEXT}
 FAILURE_KEYS = {"name": TEXT, "title": TEXT, "text": TEXT, "where": TABLE, "component": TEXT, "snapshot": (int,), "range": LIST}
 REMEDY_KEYS = {"failure": TEXT, "label": TEXT, "without": TABLE, "with": TABLE}
@@ -32,7 +32,8 @@ TARGET_KINDS = {"value_max": ("value",), "value_min": ("value",), "value_between
 
 @dataclass
 class Case:
-    """One [[case]]: `parameter` is the axis whose values are the columns of the stability matrix, `bounds` what makes a run wrong."""
+    """One [[case]]: `parameter` is the axis whose values are the columns of the stability matrix, `bounds` what makes a run wrong, or, of
+    a `condition`, what a search asks for, such as that a slope stands: beyond it nothing is wrong with the run."""
     name: str
     title: str
     scene: str
@@ -40,6 +41,7 @@ class Case:
     parameter: str
     axes: dict
     bounds: list
+    condition: bool = False
 
     @property
     def axis_keys(self):
@@ -117,7 +119,7 @@ def _read_cases(reader, data, threads, need_scene):
         if entry["parameter"] not in axes:
             reader.fail(f"'parameter' of case '{name}' is not an axis{did_you_mean(entry['parameter'], axes)}", "parameter", "case", index)
         cases.append(Case(name, entry.get("title", name.replace("_", " ")), entry["scene"], entry.get("purpose", ""), entry["parameter"],
-                          axes, _read_bounds(reader, entry, axes, bounds)))
+                          axes, _read_bounds(reader, entry, axes, bounds), entry.get("condition", False)))
         bounds += len(entry["bound"])
         combinations += own
         every.update(axes)
