@@ -51,7 +51,8 @@ def last_line(path):
     return lines[-1].strip()[:300] if lines else ""
 
 
-def _start(task):
+def start(task):
+    """A child process with a log, that does not outlive this one."""
     task.folder.mkdir(parents=True, exist_ok=True)
     for name in ("result.h5", "result.h5.part"):
         (task.folder / name).unlink(missing_ok=True)
@@ -59,7 +60,8 @@ def _start(task):
         return subprocess.Popen(task.command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=_die_with_parent)
 
 
-def _judge(task, code, seconds):
+def judge(task, code, seconds):
+    """The outcome of a run that ended with an exit code."""
     path = task.folder / "result.h5"
     if code < 0:
         try:
@@ -95,7 +97,7 @@ def run_all(tasks, jobs, tell=lambda outcome, done, running: None, tick=lambda r
     def collect():
         for process in [p for p in running if p.poll() is not None]:
             task, start = running.pop(process)
-            outcomes.append(_judge(task, process.returncode, time.monotonic() - start))
+            outcomes.append(judge(task, process.returncode, time.monotonic() - start))
             tell(outcomes[-1], len(outcomes), [t.id for t, _ in running.values()])
 
     try:
@@ -103,7 +105,7 @@ def run_all(tasks, jobs, tell=lambda outcome, done, running: None, tick=lambda r
             while waiting and len(running) < jobs:
                 task = waiting.pop(0)
                 try:
-                    running[_start(task)] = (task, time.monotonic())
+                    running[start(task)] = (task, time.monotonic())
                 except OSError as error:
                     outcomes.append(Outcome(task, "failed", f"cannot be started: {error}", 0.0))
                     tell(outcomes[-1], len(outcomes), [])

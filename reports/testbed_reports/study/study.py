@@ -17,6 +17,7 @@ from ..grade.metrics_csv import metrics_csv
 from ..grade.targets import as_text, judge_all
 from ..read.results import is_finished, seed_of
 from ..read.study_file import StudyError, read_study, toml_value
+from .campaign import job, run_by_snakemake
 from .resolve import Refused, method_of, refusals, refuse_twins, resolve, run_arguments, with_own_constants
 from .runner import Task, run_all
 from .search import Searches, name_of
@@ -192,9 +193,9 @@ def _write_plan(folder, plan):
     write_atomically(folder / PLAN, json.dumps(plan, indent=1) + "\n")
 
 
-def run_study(study, testbed, out, jobs, keep, quiet, command):
+def run_study(study, testbed, out, options, command):
     """Runs one study in out/<name>. Returns (list of problems, interrupted)."""
-    folder = Path(out) / study.name
+    folder, jobs, quiet = Path(out) / study.name, options.jobs, options.quiet
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder / ".lock", "w", encoding="utf-8") as lock:
         try:
@@ -206,7 +207,7 @@ def run_study(study, testbed, out, jobs, keep, quiet, command):
         searches, failed, interrupted = Searches(study, folder), {}, False
         waiting = [c for c in study.combinations if not c.bisection] + searches.next([])
         while waiting and not interrupted:
-            entries, left_out, tasks = expand(study, waiting, testbed, folder, keep, jobs)
+            entries, left_out, tasks = expand(study, waiting, testbed, folder, options.keep, jobs)
             first = not plan["runs"]
             plan["runs"] += entries
             plan["left_out"] += left_out
@@ -219,7 +220,8 @@ def run_study(study, testbed, out, jobs, keep, quiet, command):
             if first and plan["left_out"]:
                 progress.say(f"{study.name}: {len(plan['left_out'])} combinations left out: {plan['left_out'][0]['reason']}")
             try:
-                outcomes = run_all(tasks, jobs, progress.tell, progress.tick)
+                outcomes = run_all(tasks, jobs, progress.tell, progress.tick) if options.engine == "processes" else \
+                    run_by_snakemake(tasks, jobs, progress.tell, folder, options.snakemake, quiet)
             except KeyboardInterrupt as stop:
                 outcomes, interrupted = (stop.args[0] if stop.args else []), True
             progress.close()
@@ -248,6 +250,8 @@ def parse_arguments(arguments):
     parser.add_argument("--keep", action="store_true", help="keep finished runs of another build of the executable")
     parser.add_argument("--check", action="store_true", help="judge the targets, exit code 1 if one fails")
     parser.add_argument("--quiet", action="store_true")
+    parser.add_argument("--engine", choices=("processes", "snakemake"), default="processes", help="who runs the runs (default processes)")
+    parser.add_argument("--snakemake", default="", metavar="OPTIONS", help="passed on to Snakemake, such as '--profile slurm --jobs 200'")
     options = parser.parse_args(arguments)
     if options.jobs < 1:
         parser.error("-j must be at least 1")
@@ -261,6 +265,8 @@ def _terminate(*_):
 def main(arguments=None):
     """Entry of `testbed study`; returns the exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments[:1] == ["--job"]:  # within a job of Snakemake
+        return job(arguments[1:])
     try:
         options = parse_arguments(arguments)
     except SystemExit as stop:
@@ -276,8 +282,7 @@ def main(arguments=None):
             raise StudyError(f"two studies are called '{twice}'")
         testbed = find_testbed()
         for study in studies:
-            new, interrupted, data = run_study(study, testbed, options.output, options.jobs, options.keep,
-                                               options.quiet, command)
+            new, interrupted, data = run_study(study, testbed, options.output, options, command)
             problems += new
             if interrupted:
                 break
