@@ -44,8 +44,17 @@ def _outcome(home, task):
         return Outcome(task, "failed", "its job left no word: see Snakemake's log", 0.0)
 
 
-def run_by_snakemake(tasks, jobs, tell, folder, options, quiet):
-    """As run_all(): outcomes of the tasks, of which `jobs` run side by side; `options` are passed on to Snakemake, such as a profile.
+def _profile(home):
+    """Options for Slurm: the profile beside this file, with the place of its script."""
+    here, own = Path(__file__).with_name("slurm"), home / "slurm"
+    own.mkdir(exist_ok=True)
+    write_atomically(own / "config.yaml", (here / "config.yaml").read_text().replace("STATUS", str(here / "status")))
+    return ["--profile", str(own.resolve())]
+
+
+def run_by_snakemake(tasks, jobs, tell, folder, engine, options, quiet):
+    """As run_all(): outcomes of the tasks, of which `jobs` run side by side, or, with the engine slurm, as many as that takes; `options` are
+    passed on to Snakemake.
 
     Raises StudyError without Snakemake, KeyboardInterrupt with the outcomes so far.
     """
@@ -53,7 +62,7 @@ def run_by_snakemake(tasks, jobs, tell, folder, options, quiet):
         return []
     program = shutil.which("snakemake")
     if not program:
-        raise StudyError("--engine snakemake: no 'snakemake' on PATH (Debian: apt-get install snakemake)")
+        raise StudyError(f"--engine {engine}: no 'snakemake' on PATH (Debian: apt-get install snakemake)")
     home = folder / "campaign"
     for name in ("done", "outcomes"):
         (home / name).mkdir(parents=True, exist_ok=True)
@@ -65,7 +74,7 @@ def run_by_snakemake(tasks, jobs, tell, folder, options, quiet):
     write_atomically(home / "tasks.json", json.dumps({task.id: a for task, a in zip(tasks, asked)}, indent=1) + "\n")
     shutil.copyfile(Path(__file__).with_name("Snakefile"), home / "Snakefile")
     job = shlex.join([sys.executable, str(Path(__file__).resolve().parents[2] / "testbed-study"), "--job"])
-    command = [program, "--snakefile", "Snakefile", "--config", f"job={job}", "--cores", str(jobs), "--keep-going", "--nolock", "--rerun-incomplete",
+    command = [program, "--snakefile", "Snakefile", "--config", f"job={job}", *(_profile(home) if engine == "slurm" else ["--cores", str(jobs)]), "--keep-going", "--nolock", "--rerun-incomplete",
                "--rerun-triggers", "mtime", *(["--quiet"] if quiet else []), *shlex.split(options)]
     process = subprocess.Popen(command, cwd=home, stdout=sys.stderr)
     try:

@@ -221,7 +221,7 @@ def run_study(study, testbed, out, options, command):
                 progress.say(f"{study.name}: {len(plan['left_out'])} combinations left out: {plan['left_out'][0]['reason']}")
             try:
                 outcomes = run_all(tasks, jobs, progress.tell, progress.tick) if options.engine == "processes" else \
-                    run_by_snakemake(tasks, jobs, progress.tell, folder, options.snakemake, quiet)
+                    run_by_snakemake(tasks, jobs, progress.tell, folder, options.engine, options.snakemake, quiet)
             except KeyboardInterrupt as stop:
                 outcomes, interrupted = (stop.args[0] if stop.args else []), True
             progress.close()
@@ -250,8 +250,8 @@ def parse_arguments(arguments):
     parser.add_argument("--keep", action="store_true", help="keep finished runs of another build of the executable")
     parser.add_argument("--check", action="store_true", help="judge the targets, exit code 1 if one fails")
     parser.add_argument("--quiet", action="store_true")
-    parser.add_argument("--engine", choices=("processes", "snakemake"), default="processes", help="who runs the runs (default processes)")
-    parser.add_argument("--snakemake", default="", metavar="OPTIONS", help="passed on to Snakemake, such as '--profile slurm --jobs 200'")
+    parser.add_argument("--engine", choices=("processes", "snakemake", "slurm"), default="processes", help="who runs the runs (default processes)")
+    parser.add_argument("--snakemake", default="", metavar="OPTIONS", help="passed on to Snakemake, such as '--profile DIR --jobs 200'")
     options = parser.parse_args(arguments)
     if options.jobs < 1:
         parser.error("-j must be at least 1")
