@@ -22,6 +22,16 @@ double load_average()
     return getloadavg(load, 1) == 1 ? load[0] : 0;
 }
 
+int others_running()
+{
+    std::ifstream file("/proc/loadavg");
+    double minutes = 0;
+    int running = 0;
+    for (int k = 0; k < 3; ++k)
+        file >> minutes;
+    return file >> running ? running - 1 : -1;
+}
+
 std::string time_stamp()
 {
     return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));

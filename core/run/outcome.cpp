@@ -41,6 +41,7 @@ void write_provenance(ResultFile& file)
     file.attribute("/provenance", "cpu", cpu_name());
     file.attribute("/provenance", "threads", std::int64_t{threads()});
     file.attribute("/provenance", "load_average", load_average());
+    file.attribute("/provenance", "others_running", std::int64_t{others_running()});
     file.attribute("/provenance", "started", time_stamp());
 }
 

@@ -101,3 +101,10 @@ def test_repeats_count_by_the_mean_of_their_errors_and_the_median_of_their_times
     (only,), lost = costs_of([run(1, 0.1, 1.0), run(2, 0.2, 9.0), run(3, 0.6, 2.0)], {"quantity": "stress", "norm": "l2"}, 2)
     assert not lost and only.error == pytest.approx(0.3)
     assert (only.least_s, only.solve_s, only.most_s) == (1.0, 2.0, 9.0)
+
+
+@pytest.mark.parametrize("provenance, busy", [({"load_average": 1.0}, False), ({"load_average": 2.5}, True), ({"load_average": 9.0, "others_running": 1}, False),
+                                              ({"load_average": 0.1, "others_running": 2}, True), ({"load_average": 9.0, "others_running": -1}, True), ({}, False)])
+def test_busy_is_who_runs_now(provenance, busy):
+    """A build that has just ended leaves a load average, but no one that runs."""
+    assert is_busy(SimpleNamespace(result=SimpleNamespace(provenance=provenance)), 2) is busy

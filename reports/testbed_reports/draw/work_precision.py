@@ -38,8 +38,11 @@ def error_of(run, entry):
 
 
 def is_busy(run, cores):
-    """Whether the load average at the start of a run was above the number of cores."""
-    load = run.result.provenance.get("load_average")
+    """Whether at the start of a run no core was left for it: as many others ran as there are cores; where a file does not tell, whether the load
+    average, which lags by a minute, was above the number of cores."""
+    others, load = (run.result.provenance.get(name) for name in ("others_running", "load_average"))
+    if isinstance(others, (int, float)) and others >= 0:
+        return bool(cores and others >= cores)
     return bool(cores and isinstance(load, (int, float)) and load > cores)
 
 

@@ -1,4 +1,5 @@
 """A study's folder in memory: its runs, their results and their rows of metrics."""
+import hashlib
 import json
 import math
 import os
@@ -121,6 +122,15 @@ def write_atomically(path, text):
     os.replace(part, path)
 
 
+def digest(*parts, length=8):
+    """So many hexadecimal digits of a hash of texts or bytes."""
+    sha = hashlib.sha256()
+    for part in parts:
+        data = part if isinstance(part, bytes) else str(part).encode()
+        sha.update(len(data).to_bytes(8, "little") + data)
+    return sha.hexdigest()[:length]
+
+
 def read_run(folder, entry, file="result.h5"):
     """A run from its folder; never raises for a bad file, but says so in `reason`."""
     folder = Path(folder)
@@ -140,6 +150,9 @@ def read_run(folder, entry, file="result.h5"):
                       seed=result.seed)
     except ResultError as error:
         run.status, run.reason = "unreadable", str(error).replace(str(folder) + os.sep, "")
+        return run
+    if entry.get("scene") not in (None, digest(str(result.scene.get("resolved", "")))):
+        run.status, run.reason = "unreadable", f"{file} is of another scene than the plan says: run the study once more"
         return run
     run.result, run.status, run.reason = result, result.status, result.reason
     grades = metrics.grade(result)

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..read.results import FINISHED
+from ..read.study_file import matches, same
 from .convergence import fit_order
 from .targets import mean_by_size, number, values_by_size
 
@@ -24,17 +26,26 @@ class Number:
     scale: float = 1
     offset: float = 0
     missing: str = ""
+    failed: bool = False  # what is missing did not complete: no evidence is lacking
+    left_out: bool = False  # its method is not built
+    suspect: int = 0  # so many of its runs are suspect
 
     def __str__(self):
         return self.text
 
 
 TAKEN = {"mean": statistics.fmean, "median": statistics.median, "min": min, "max": max}
+NO_SETTING = ("repeat", "dt", "seed")
+
+
+def value_of(run, quantity, norm):
+    """The metric; of a run that did not complete only its verdict."""
+    return run.value(quantity, norm) if run.completed or quantity == "verdict" else math.nan
 
 
 def taken(take, runs, quantity, norm):
     """(values, runs without a number): of each run, or the one number made of all."""
-    values = [run.value(quantity, norm) for run in runs]
+    values = [value_of(run, quantity, norm) for run in runs]
     lost, good = [run for run, v in zip(runs, values) if not math.isfinite(v)], [v for v in values if math.isfinite(v)]
     if not good or take == "every":
         return good, lost
@@ -45,30 +56,61 @@ def taken(take, runs, quantity, norm):
     return ([order] if math.isfinite(order) else []), lost
 
 
+def ratios(take, runs, below, quantity, norm):
+    """The same over that of the runs `below`; of each run over the mean of those that share its setting, as far as these have several."""
+    if take != "every":
+        (top, lost), (base, lost_below) = taken(take, runs, quantity, norm), taken(take, below, quantity, norm)
+        return [v / base[0] for v in top] if base and base[0] else [], lost + lost_below
+    keys = [k for k in dict.fromkeys(k for run in below for k in run.values) if k not in NO_SETTING and len({str(run.values.get(k)) for run in below}) > 1]
+    found, lost = [], [run for run in runs + below if not math.isfinite(value_of(run, quantity, norm))]
+    for run in runs:
+        pair = [value_of(b, quantity, norm) for b in below if all(same(b.values.get(k), run.values.get(k)) for k in keys)]
+        pair = [v for v in pair if math.isfinite(v)]
+        if not pair or not statistics.fmean(pair):
+            lost.append(run)
+        elif run not in lost:
+            found.append(value_of(run, quantity, norm) / statistics.fmean(pair))
+    return found, list({id(run): run for run in lost}.values())
+
+
 def _text(values, digits):
     low, high = (number(v, digits) for v in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
 
 
+def _of_seeds(runs, values, digits):
+    """'mean ± standard deviation (n seeds)' of runs that differ by their seeds alone; '' for others."""
+    settings = {tuple((k, str(v)) for k, v in run.values.items() if k not in NO_SETTING and not k.endswith(".seed")) for run in runs}
+    seeds = {str(run.values.get("seed", "")) for run in runs}
+    if len(settings) > 1 or len(seeds) < 2 or len(values) < 2:
+        return ""
+    return f"{number(statistics.fmean(values), digits)} ± {number(statistics.stdev(values), 2)} ({len(values)} seeds)"
+
+
+def _is_left_out(study, where):
+    return any(matches({**e.get("axes", {}), **{k: e.get(k) for k in ("variant", "method", "L", "case")}}, where) for e in study.left_out)
+
+
 def number_of(study, entry):
-    """The number that a [[number]] or a [[claim.test]] asks for; where it cannot be made, `missing` says why and the text is '?'."""
+    """The number that a [[number]] or a [[claim.test]] asks for; where it cannot be made, or not of all its runs, `missing` says why."""
     quantity, norm, take, scale, offset = (entry[k] for k in ("quantity", "norm", "take", "scale", "offset"))
-    runs, below = study.select(entry["where"]), study.select({**entry["where"], **entry["over"]}) if "over" in entry else []
-    found = Number("?", (), study.name, quantity, norm, take, [r.id for r in runs], [r.id for r in below], scale, offset)
+    below_where = {**entry["where"], **entry.get("over", {})}
+    runs, below = study.select(entry["where"]), study.select(below_where) if "over" in entry else []
+    found = Number("?", (), study.name, quantity, norm, take, [r.id for r in runs], [r.id for r in below], scale, offset,
+                   suspect=sum(run.suspect for run in runs + below))
     what = f"{quantity} {norm}".rstrip()
-    if not runs or ("over" in entry and not below):
-        return replace(found, missing=f"no run to take {what} from")
-    values, lost = taken(take, runs, quantity, norm)
-    if "over" in entry:
-        base, lost_below = taken("mean" if take == "every" else take, below, quantity, norm)
-        lost = lost + lost_below
-        values = [v / base[0] for v in values] if base and base[0] else []
+    for chosen, where in ((runs, entry["where"]), *([(below, below_where)] if "over" in entry else [])):
+        if not chosen:
+            return replace(found, left_out=_is_left_out(study, where), missing=f"no run to take {what} from: 'where' chooses none")
+    values, lost = ratios(take, runs, below, quantity, norm) if "over" in entry else taken(take, runs, quantity, norm)
+    failed = [run for run in lost if run.status in FINISHED and not run.completed]
+    told = ", ".join(f"{run.id} {run.label if not run.completed else 'has none'}" for run in lost[:3]) + (f" and {len(lost) - 3} more" if len(lost) > 3 else "")
     if not values:
-        first = lost[0] if lost else None
-        return replace(found, missing=f"no {what}" + (f": {first.name} {first.label}" if first and not first.completed else ""))
+        return replace(found, failed=bool(failed) and len(failed) == len(lost), missing=f"no {what}" + (f": {told}" if told else ""))
     values = [v * scale + offset for v in values]
-    return replace(found, text=_text(values, entry["digits"]), values=tuple(sorted({min(values), max(values)})),
-                   missing=f"{len(lost)} of {len(runs) + len(below)} runs have no {what}" if lost else "")
+    text = _of_seeds(runs, values, entry["digits"]) if take == "every" and "over" not in entry else ""
+    return replace(found, text=text or _text(values, entry["digits"]), values=tuple(sorted({min(values), max(values)})), failed=len(failed) == len(lost) > 0,
+                   missing=f"no {what} of {told}" if lost else "")
 
 
 def numbers_of(study):

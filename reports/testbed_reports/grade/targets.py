@@ -102,13 +102,15 @@ def values_by_size(runs, quantity, norm):
 
 
 def _told(run):
+    if run.result is None:
+        return f"{run.id} {run.status}"
     size = run.values.get("L")
     at = f" at L = {size:g}" if isinstance(size, (int, float)) else ""
     return f"{run.name} {run.status}{at}"
 
 
 def _judge_value(target, runs, quantity, norm):
-    values = [run.value(quantity, norm) for run in runs]
+    values = [run.value(quantity, norm) if run.completed or quantity == "verdict" else math.nan for run in runs]
     low = target.get("low", target["value"] if target["kind"] == "value_min" else -math.inf)
     high = target.get("high", target["value"] if target["kind"] == "value_max" else math.inf)
     lost = [run for run, v in zip(runs, values) if not math.isfinite(v)]
@@ -119,7 +121,8 @@ def _judge_value(target, runs, quantity, norm):
     elif len(good) == 1 or math.isclose(min(good), max(good), rel_tol=1e-6):
         measured = number(good[0], digits)
     else:
-        measured = f"{number(min(good), digits)} to {number(max(good), digits)}"
+        ends = [number(v, digits) for v in (min(good), max(good))]
+        measured = " to ".join(dict.fromkeys(ends))
     if lost:
         return measured, "fail", "no number: " + ", ".join(_why(run, quantity, norm) for run in lost)
     return measured, "pass" if all(low <= v <= high for v in good) else "fail", ""
@@ -187,6 +190,8 @@ def judge(target, study):
     ratios = [r for r in ratios if math.isfinite(r)]
     if ratios and quantity != "static":  # a static number never stands without it
         note = "; ".join(filter(None, (note, f"kinetic/strain energy ≤ {number(max(ratios))}")))
+    if doubtful := sum(run.suspect for run in runs):
+        note = "; ".join(filter(None, (note, f"{doubtful} of {len(runs)} runs suspect")))
     return _with_known(target, Verdict(**base, measured=measured, verdict=verdict, note=note))
 
 

@@ -49,8 +49,12 @@ def _variants(runs):
 
 def _about(study, where, quantity, norm):
     """'stress l2, column' and the choice beside the methods, as far as there is one."""
-    choice = ", ".join(f"{k.rsplit('.', 1)[-1]} {v}" for k, v in where.items() if k not in (*BY_METHOD, "case"))
+    def value(v):
+        return " and ".join(map(value, v)) if isinstance(v, list) else f"{v:g}" if isinstance(v, float) else str(v)
+
+    choice = ", ".join(f"{k.rsplit('.', 1)[-1]} {value(v)}" for k, v in where.items() if k not in (*BY_METHOD, "case"))
     case = where.get("case") if isinstance(where.get("case"), str) else study.name
+    case = case if case in study.name or study.name in case else f"{case} in {study.name}"
     return f"{words(quantity, norm)}, {case.replace('_', ' ')}" + (f" ({choice})" if choice else "")
 
 
@@ -73,22 +77,43 @@ def _slopes(study):
             runs = [run for run in runs if in_sizes(run, target)]
             if len({run.values.get("L") for run in runs}) < 2:
                 continue
-            lost = [run for run in runs if not run.completed]
+            lost = any(not run.completed for run in runs)
             values, _ = taken(kind, runs, quantity, norm)
             most = max((abs(v) for run in runs if math.isfinite(v := run.value(quantity, norm))), default=0)
             if kind == "order" and values and most <= metrics.ROUNDING:
                 question.cells[variant] = "exact"
             elif values:
-                question.cells[variant] = Number(f"{values[0]:.2f}" + (" *" if lost else ""), (values[0],), study.name, quantity, norm, kind,
+                question.cells[variant] = Number(f"{values[0]:.2f}" + marks(runs, lost), (values[0],), study.name, quantity, norm, kind,
                                                  [run.id for run in runs])
             else:
-                question.cells[variant] = lost[0].status if lost else "n/a"
+                question.cells[variant] = next((run.status for run in runs if not run.completed), "n/a")
         numbers = {v: c.values[0] for v, c in question.cells.items() if isinstance(c, Number)}
         if kind == "order" and numbers:
             question.best = [v for v, value in numbers.items() if value >= max(numbers.values()) - 0.05]
         if question.cells:
             found[key] = question
     return list(found.values())
+
+
+def marks(runs, lost=False):
+    """Signs after a number: * where runs are lost, ‡ where some are suspect."""
+    return (" *" if lost else "") + (" ‡" if any(run.suspect for run in runs) else "")
+
+
+def lasting(costs, accuracy):
+    """The settings from whose cell size on, to finer ones, the best error of each size is at most `accuracy`: a single lucky size is none."""
+    kept = []
+    for size in sorted({c.L or 0 for c in costs}):
+        own = [c for c in costs if (c.L or 0) == size]
+        if min(c.error for c in own) > accuracy:
+            break
+        kept += own
+    return kept
+
+
+def is_elastic(run):
+    """Whether a run of FEM, which is elastic, stands among those of soil that fails."""
+    return run.result is not None and run.result.method == "fem" and any(m.get("law") == "mohr_coulomb" for m in run.result.resolved.get("material", []))
 
 
 def _reaches(study):
@@ -101,17 +126,17 @@ def _reaches(study):
     for entry in figures:
         quantity, norm = entry["quantity"], entry.get("norm", "")
         about = _about(study, entry["where"], quantity, norm)
-        costs = {v: [c for c in costs_of(runs, entry)[0] if not any(run.suspect for run in c.runs)] for v, runs in _variants(study.select(entry["where"])).items()}
+        costs = {v: [c for c in costs_of(runs, entry, study.plan.get("cores"))[0] if not any(run.suspect for run in c.runs)] for v, runs in _variants(study.select(entry["where"])).items()}
         for accuracy in ACCURACIES:
             question = Question(f"Seconds to {100 * accuracy:g} %: {about}", about, f"{100 * accuracy:g} %", figure_anchor(names[id(entry)]))
             for variant, own in costs.items():
-                best = cheapest(own, accuracy)
+                best = cheapest(lasting(own, accuracy), accuracy)
                 if best is None:
                     question.cells[variant] = "not reached"
                     continue
-                question.cells[variant] = Number(number(best.solve_s, 2) + (" †" if is_static(best.runs[0]) else ""), (best.solve_s,), study.name, "solve_s",
+                question.cells[variant] = Number(number(best.solve_s, 2) + (" busy" if best.busy else "") + (" †" if is_static(best.runs[0]) else ""), (best.solve_s,), study.name, "solve_s",
                                                  "", "median", [r.id for r in best.runs])
-            times = {v: c.values[0] for v, c in question.cells.items() if isinstance(c, Number) and not c.text.endswith("†")}
+            times = {v: c.values[0] for v, c in question.cells.items() if isinstance(c, Number) and not c.text.endswith(("†", "busy"))}
             question.best = [v for v, t in times.items() if t == min(times.values())]
             if times:
                 found.append(question)
@@ -130,8 +155,10 @@ def _values(study):
         question = Question(about[:1].upper() + about[1:], about, "value", study_anchor(study))
         for variant, runs in _variants(study.select(where)).items():
             made = number_of(study, {**PLAIN, "quantity": quantity, "norm": norm, "where": {**where, "variant": variant}})
-            if made.values:
-                question.cells[variant] = made
+            if quantity != "modulus" and any(map(is_elastic, runs)):
+                question.cells[variant] = "elastic"
+            elif made.values:
+                question.cells[variant] = replace(made, text=made.text + marks(runs, made.missing))
             elif any(not run.completed for run in runs):
                 question.cells[variant] = next(run.status for run in runs if not run.completed)
         if question.cells:
@@ -158,7 +185,7 @@ def _limits(study):
 def _failures(studies):
     """The question how many runs diverged or are suspect."""
     question = Question("Runs that failed or are suspect, of all", "", "failures", "failures")
-    every = _variants([run for study in studies for run in study.runs])
+    every = _variants([run for study in studies if not study.spec.cases for run in study.runs])
     for variant, runs in every.items():
         bad = sum(run.suspect or not run.completed for run in runs)
         question.cells[variant] = f"{bad} of {len(runs)}"
@@ -174,7 +201,7 @@ def questions(studies):
     rows = [q for found in (slopes, reaches) for study in plain for q in found[study.folder]]
     rows += [q for study in plain if not slopes[study.folder] and not reaches[study.folder] for q in _values(study)]
     rows += [q for study in studies if study.spec.cases for q in _limits(study)]
-    return rows + ([_failures(studies)] if any(study.runs for study in studies) else [])
+    return rows + ([_failures(plain)] if any(study.runs for study in plain) else [])
 
 
 def _listed(names):
@@ -184,7 +211,7 @@ def _listed(names):
 
 def _behind(question):
     """How far behind the second is."""
-    timed = sorted((c for c in question.cells.values() if isinstance(c, Number) and not c.text.endswith("†")), key=lambda c: c.values[0])
+    timed = sorted((c for c in question.cells.values() if isinstance(c, Number) and not c.text.endswith(("†", "busy"))), key=lambda c: c.values[0])
     if len(timed) < 2:
         return []
     first, second = timed[:2]
@@ -244,12 +271,12 @@ def _codes(run):
 
 def _failing(studies):
     """What fails where, and why the guards say it does."""
-    runs = [(study, run) for study in studies for run in study.runs]
+    runs = [(study, run) for study in studies if not study.spec.cases for run in study.runs]
     failed = [(s, r) for s, r in runs if not r.completed]
     suspect = [(s, r) for s, r in runs if r.suspect]
     if not failed and not suspect:
         return [[f"All {len(runs)} runs completed, and no guard found one suspect."]] if runs else []
-    said = f"Of {len(runs)} runs {len(failed)} did not complete and {len(suspect)} are suspect"
+    said = f"Of {len(runs)} runs {len(failed)} did not complete or are missing and {len(suspect)} are suspect"
     by = []
     for variant in dict.fromkeys(r.name for _, r in failed + suspect):
         own = [(s, r) for s, r in failed + suspect if r.name == variant]

@@ -31,7 +31,7 @@ class Ledger:
             if name is not None:
                 found = self._of[study.folder][name]
                 parts.append(found)
-                if found.missing:
+                if found.missing and not found.left_out:
                     self.missing.append([study.name, f"number {name}", found.missing])
         return self.pieces(*parts)
 

@@ -13,12 +13,13 @@ from ..draw.table import Table, as_csv
 from ..grade.claims import judge_claims
 from ..grade.dataset import read_study_folder, write_atomically
 from ..grade.loose import study_of
+from ..grade.metrics_csv import metrics_csv
 from ..grade.targets import judge_all
 from ..read.study_file import StudyError
 from . import bench, findings
 from .against import moved_table
 from .ledger import Ledger
-from .names import slug
+from .names import slug, study_anchor
 from .page import inline_svg, live_svg, render, scripts
 from .paper import write_paper
 from .references import references
@@ -148,10 +149,17 @@ def _read(folders, failures, unreadable):
 
 def _claims(judged, ledger):
     """Claims as the template wants them."""
+    for claim in judged:
+        ledger.missing += [[t.study, f"claim {claim.name}: {t.when}", t.measured.missing] for t in claim.tests if t.verdict == "undecided"]
     return [{"name": claim.name, "words": claim.words, "source": claim.source, "verdict": claim.verdict, "conditions": claim.conditions,
              "notes": [ledger.text(study, text) for text, study in claim.notes],
              "tests": [{"when": t.when, "asked": t.asked, "measured": ledger.pieces(t.measured), "verdict": t.verdict,
-                        "note": t.measured.missing, "study": t.study} for t in claim.tests]} for claim in judged]
+                        "note": "; ".join(filter(None, (t.measured.missing, suspects(t.measured)))), "study": t.study} for t in claim.tests]} for claim in judged]
+
+
+def suspects(number):
+    """How many runs of a number are suspect, in words."""
+    return f"{number.suspect} of {len(number.runs) + len(number.over)} runs suspect" if number.suspect else ""
 
 
 def _lead(sections):
@@ -168,13 +176,16 @@ def _first_screen(studies, sections, claims, verdicts, ledger):
     said = [ledger.pieces(*parts) for parts in findings.sentences(studies, rows, claims)]
     variants = list(dict.fromkeys(v for row in rows for v in row.cells))
     matrix = [{"text": row.text, "anchor": row.anchor,
+               "folded": row.goal == "value",
                "cells": [{"piece": ledger.pieces(row.cells.get(v, ""))[0], "best": v in row.best} for v in variants]} for row in rows]
-    bad = [(study.name, run) for study in studies for run in study.runs if run.suspect or not run.completed]
+    bad = [(study.name, run) for study in studies if not study.spec.cases for run in study.runs if run.suspect or not run.completed]
+    silent = sum(run.verdict.silent and run.completed for study in studies if study.spec.cases for run in study.runs)
     return {"compared": findings.compared(studies) if studies else "", "sentences": said, "variants": variants, "matrix": matrix,
             "lead": _lead(sections), "targets": Counter(v.verdict for _, v in verdicts), "missed": [v for _, v in verdicts if v.verdict == "fail"],
             "claims": Counter(claim.verdict for claim in claims),
             "bad": Counter(run.status if not run.completed else "suspect" for _, run in bad),
-            "which": list(dict.fromkeys(f"{run.name} ({run.values.get('case') or name})" for name, run in bad))}
+            "which": list(dict.fromkeys(f"{run.name} ({run.values.get('case') or name})" if run.result is not None else run.id for name, run in bad)),
+            "silent": silent, "cases": [(study.spec.title, study_anchor(study)) for study in studies if study.spec.cases]}
 
 
 def build(folders, out, command, unreadable=None, against=None):
@@ -211,6 +222,9 @@ def build(folders, out, command, unreadable=None, against=None):
     first = _first_screen(studies, sections, judged_claims, flat, ledger)
     if first["matrix"]:
         write_table(out, "report", questions_table(first))
+    (out / "metrics").mkdir(exist_ok=True)
+    for study in studies:  # what the numbers of this page are taken from, whatever metrics.csv says that `testbed study` wrote
+        write_atomically(out / "metrics" / f"{slug(study.name)}.csv", metrics_csv(study.runs))
     write_paper(out, title, first, list(zip([study.name for study in studies], sections)),
                 [f"report_{name}" for name, there in (("questions", first["matrix"]), ("claims", claims)) if there])
     write_atomically(out / "numbers.csv", as_csv(ledger.table()))

@@ -23,7 +23,7 @@ def _cell(cell, value):
 
 def _matrices(matrices, variants):
     return [{"name": m.case.name, "title": m.case.title, "purpose": m.case.purpose, "parameter": m.parameter,
-             "readme": f"{Path(m.case.scene).parent.parent.name}/{Path(m.case.scene).parent.name}", "asked": "Holds while" if m.case.condition else "Sound", "bounds": matrix.bounds_text(m.case, variants),
+             "readme": "/".join(Path(m.case.scene).parts[-3:-1]) if m.case.scene.startswith("../") and len(Path(m.case.scene).parts) > 3 else "", "asked": "Holds while" if m.case.condition else "Sound", "bounds": matrix.bounds_text(m.case, variants),
              "columns": [matrix.value_text(v) for v in m.values],
              "rows": [{"method": method, "cells": [_cell(c, v) for c, v in zip(m.cells[method], m.values)]} for method in m.methods]}
             for m in matrices]

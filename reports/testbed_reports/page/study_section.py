@@ -32,7 +32,7 @@ def _caption(study, entry, drawing, ledger):
 def _figure(study, entry, name, style, out, ledger, failures):
     """One figure as the template wants it; drawn for print, too."""
     what = subject(entry)
-    title = entry.get("title") or f"{entry['kind']}: {what} {entry.get('norm', '')}".replace("_", " ").strip()
+    title = entry.get("title") or f"{entry['kind']}: {what} {entry.get('norm', '')}".replace("_", " ").strip(" :")
     shown = {"title": title[:1].upper() + title[1:], "kind": entry["kind"], "image": "", "caption": [],
              "svg": "", "points": [], "error": "", "width": "column", "rem": 0, "runs": [],
              "anchor": figure_anchor(name), "paper": entry.get("paper", "").strip(), "shows": ledger.text(study, entry.get("shows", "").strip())}

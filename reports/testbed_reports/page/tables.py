@@ -171,7 +171,7 @@ def performance_table(study):
     if study.plan.get("jobs", 1) > 1:
         notes.append(f"Runs went {study.plan['jobs']} at a time: timings are those of a shared machine.")
     if busy_any:
-        notes.append(f"busy: the load average at the start was above the {cores} cores.")
+        notes.append(f"busy: at the start as many others ran as there are cores ({cores}), or, where a file does not tell, the load average was above that.")
     header = ["variant", "L [m]", "points", "steps", "solve [s]", "set-up [s]", "output [s]", "particle steps [1/s]",
               "memory [B/point]", "load", "status"]
     return Table("performance", "Performance", header, rows, notes=notes, folded=True)

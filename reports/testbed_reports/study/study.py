@@ -2,7 +2,6 @@
 import argparse
 import concurrent.futures
 import fcntl
-import hashlib
 import json
 import os
 import re
@@ -12,7 +11,7 @@ import signal
 import sys
 from pathlib import Path
 
-from ..grade.dataset import PLAN, read_study_folder, write_atomically
+from ..grade.dataset import PLAN, digest, read_study_folder, write_atomically
 from ..grade.metrics_csv import metrics_csv
 from ..grade.targets import as_text, judge_all
 from ..read.results import is_finished, seed_of
@@ -64,14 +63,6 @@ def points_per_cell(resolved):
     """Of the first body of a resolved scene."""
     bodies = resolved.get("body") or [{}]
     return bodies[0].get("points_per_cell")
-
-
-def digest(*parts, length=8):
-    sha = hashlib.sha256()
-    for part in parts:
-        data = part if isinstance(part, bytes) else str(part).encode()
-        sha.update(len(data).to_bytes(8, "little") + data)
-    return sha.hexdigest()[:length]
 
 
 def readable(method, axes, repeat, case=""):
@@ -135,7 +126,7 @@ def expand(study, combinations, testbed, folder, keep, jobs):
             entries.append({"id": run_id, "case": case_of(combination), "method": family(method), "variant": method,
                             "L": resolved.get("grid", {}).get("cell_size"), "ppc": points_per_cell(resolved),
                             "seed": seed_of(resolved), "axes": combination.axes, "repeat": repeat, "outcome": "",
-                            "command": rerun_command(combination), "search": name_of(combination)})
+                            "scene": digest(text), "command": rerun_command(combination), "search": name_of(combination)})
             out = runs / run_id
             if not is_finished(out / "result.h5"):
                 command = [str(testbed), "run", *run_arguments(combination), "--threads", str(combination.threads),
