@@ -37,7 +37,7 @@ def column(L, ppc):
 def write_result(path, L=1.0, ppc=2, variant="lpfdm", method=None, status="completed", reason="", case="column",
                  metrics="stress, displacement", reference=None, stress_error=0.0, displacement_error=0.0,
                  solve_s=1.0, load=0.5, drop=(), history=None, samples=81, probes=("tip",), scene_extra="", seed=None,
-                 commit="abc1234", overshoot=2.0, damping=0.0, energy_slope=0.0, snapshots=2, attributes=None, sealed=True):
+                 commit="abc1234", overshoot=2.0, damping=0.0, energy_slope=0.0, snapshots=2, attributes=None, sealed=True, resolved_text=None):
     """Writes a result file whose relative L2 errors are `stress_error` and `displacement_error`; returns its path.
 
     `drop`: names of datasets left out; `history`: replaces named histories; `energy_slope`: energy made per second; `attributes`:
@@ -81,7 +81,7 @@ def write_result(path, L=1.0, ppc=2, variant="lpfdm", method=None, status="compl
                           method=method, variant=variant, status=status, reason=reason,
                           kinematics="small_strain" if method == "fem" else "hypoelastic", **(attributes or {}))
         scene = file.create_group("scene")
-        scene.attrs.update(resolved="".join(resolved), cell_size=L, points_per_cell=ppc, metrics=metrics,
+        scene.attrs.update(resolved="".join(resolved) if resolved_text is None else resolved_text, cell_size=L, points_per_cell=ppc, metrics=metrics,
                            cell_origin=[0.0, 0.0])
         provenance = file.create_group("provenance")
         provenance.attrs.update(commit=commit, compiler="g++ 12.2", flags="-O3", build_type="Release", cpu="a CPU",
@@ -178,9 +178,13 @@ method = option("--method", "lpfdm")
 if "grid.cel_size" in sets:
     sys.exit("scene.toml: unknown key 'grid.cel_size', did you mean 'grid.cell_size'?")
 L = float(sets.get("grid.cell_size", 1.0))
+from synthetic import write_result, TIP, PERIOD
+text = 'method = "%s"\\ntext = %s\\n[grid]\\ncell_size = %r\\n' % (method, json.dumps(scene.read_text()), L)
+text += "\\n".join('[set."%s"]\\nvalue = %s' % item for item in sets.items())
+text += '\\n[report.reference]\\nstatic_displacement = %r\\npeak_time = %r\\nperiod = %r\\ndisplacement_scale = %r\\n' % (TIP, PERIOD / 2, PERIOD, TIP)
+text += '[[probe]]\\nname = "tip"\\n'
 if command == "check":
-    print('method = "%s"\\ntext = %s\\n[grid]\\ncell_size = %r' % (method, json.dumps(scene.read_text()), L))
-    print("\\n".join('[set."%s"]\\nvalue = %s' % item for item in sets.items()))
+    print(text, end="")
     sys.exit(0)
 with open(here / "calls.txt", "a") as calls:
     calls.write(json.dumps([method, L, sets, option("--threads")]) + "\\n")
@@ -196,9 +200,8 @@ if what == "nothing":
 if what == "sleep":
     (here / "sleeping").touch()
     time.sleep(60)
-from synthetic import write_result
 status = {{"diverge": "diverged", "limit": "time_limit", "interrupt": "interrupted"}}.get(what, "completed")
-write_result(out.with_suffix(".h5.part"), L=L, variant=method, status=status, reason=what, stress_error=0.02 * L**2)
+write_result(out.with_suffix(".h5.part"), L=L, variant=method, status=status, reason=what, stress_error=0.02 * L**2, resolved_text=text)
 os.replace(out.with_suffix(".h5.part"), out)
 sys.exit({{"diverge": 2, "limit": 3}}.get(what, 0))
 '''

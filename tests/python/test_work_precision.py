@@ -6,7 +6,7 @@ from synthetic import write_study
 from testbed_reports.page import bench
 from testbed_reports.grade.dataset import read_study_folder
 from testbed_reports.page.report import build
-from testbed_reports.draw.work_precision import Cost, cheapest, costs_of, error_of, front, reach
+from testbed_reports.draw.work_precision import Cost, cheapest, costs_of, error_of, front, is_busy, reach
 
 FIGURES = """
 [[figure]]
