@@ -281,6 +281,43 @@ def test_a_lucky_size_wins_nothing(tmp_path):
     assert "‡" in order and "1 of 3 runs suspect" in page
 
 
+def questions(page):
+    return {re.sub(r"<[^>]+>", "", row[0]): re.findall(r"<td(.*?)</td>", row[1], re.S)
+            for row in re.findall(r'<th scope="row">(.*?)</th>(.*?)</tr>', page, re.S)}
+
+
+def test_who_fails_on_finer_cells_wins_nothing(tmp_path):
+    """lpfdm is within 1 % at 2 m and diverges below; mpm-cpgimp has order 3 on the two sizes that it survives: neither is best."""
+    def change(v, L, r):
+        if (v == "lpfdm" and L < 2) or (v == "mpm-cpgimp" and L < 1):
+            return {"status": "diverged", "reason": "x"}
+        return {"lpfdm": {"stress_error": 0.005}, "mpm-cpgimp": {"stress_error": 0.1 * L**3}}.get(v, {"stress_error": 0.01 * L**2})
+    folder = write_study(tmp_path / "column", FINDINGS.split("[[number]]")[0].replace("At best {least}.", ""), sizes=(2.0, 1.0, 0.5, 0.25), metrics="stress",
+                         models={k: MODELS[k] for k in ("lpfdm", "mpm-linear", "mpm-cpgimp")}, change=change)
+    rows = questions(build([folder], tmp_path / "out", "c").read_text())
+    seconds = next(cells for text, cells in rows.items() if text.startswith("Seconds to 1 %"))
+    order = next(cells for text, cells in rows.items() if text.startswith("Order"))
+    assert "not reached" in seconds[0] and "best" in seconds[1] and "best" not in seconds[0]
+    assert "3.00 *" in order[2] and "best" not in order[2] and "best" in order[1]
+
+
+def test_orders_of_settings_and_ranges(tmp_path):
+    """A range of sizes is a question of its own."""
+    target = "[[target]]\nlabel = \"{}\"\nquantity = \"stress\"\nnorm = \"l2\"\nkind = \"order_min\"\nvalue = 0\n"
+    text = target.format("all") + target.format("fine") + "L_from = 0.5\nL_to = 1.0\n"
+    errors = {2.0: 0.03, 1.0: 0.02, 0.5: 0.005}
+    folder = write_study(tmp_path / "column", text, sizes=(2.0, 1.0, 0.5), metrics="stress", models={"lpfdm": lambda L: errors[L]})
+    rows = questions(build([folder], tmp_path / "out", "c").read_text())
+    whole, fine = (next(cells[0] for text, cells in rows.items() if text.startswith("Order") and ("for L" in text) is ranged) for ranged in (False, True))
+    assert "2.00" in fine and "1.29" in whole
+
+
+def test_repeats_are_no_seeds():
+    from testbed_reports.grade.numbers import mean_of_seeds
+    assert mean_of_seeds([(1, 0.1), (1, 0.1), (2, 0.2), (2, 0.2)], 3) == "0.150 ± 0.071 (2 seeds)"
+    assert mean_of_seeds([(1, 0.1), (2, 0.2), (3, float("nan"))], 3) == "0.150 ± 0.071 (2 of 3 seeds)" and mean_of_seeds([(1, 0.1), (1, 0.2)], 3) == ""
+
+
 def test_a_file_of_another_scene_is_refused(tmp_path):
     folder = findings_study(tmp_path)
     plan = json.loads((folder / "plan.json").read_text())

@@ -78,6 +78,9 @@ def test_what_moved(tmp_path, capsys):
     page = build([new], tmp_path / "out", "c", against=old.parent).read_text()
     part = re.sub(r"<[^>]+>", " ", page[page.index('id="moved"'):page.index('id="failures"')])
     assert "stress l2" in part and "lpfdm" in part and "mpm-linear" not in part and "solve" not in part
+    more = write_study(tmp_path / "old" / "gone", sizes=(2.0, 1.0), metrics="stress")
+    page = build([old], tmp_path / "gone", "c", against=more.parent).read_text()
+    assert re.search(r"gone\s*the whole study\s*there\s*none", re.sub(r"<[^>]+>", " ", page))
     same = build([old], tmp_path / "same", "c", against=old).read_text()
     assert "Nothing: every number lies within" in same
     assert main([str(new), "-o", str(tmp_path / "x"), "--against", str(tmp_path / "none")]) == 1
@@ -106,7 +109,8 @@ def test_import_into_a_study(tmp_path, capsys):
     assert bring([str(path), "--study", str(folder), "--name", "mine"]) == 0
     page = build([folder], tmp_path / "out", "c").read_text()
     assert "my-code" in page and "of another code" in page
-    for bad in (["--study", str(tmp_path)], ["--study", str(folder), "--name", "x_0123abcd-0123"], ["--study", str(folder), "--name", "../x"]):
+    for bad in (["--study", str(tmp_path)], ["--study", str(folder), "--name", "x_0123abcd-0123"], ["--study", str(folder), "--name", "../x"], ["--study", str(folder), "--name", ".."],
+                ["--study", str(folder), "--name", "my result"], ["--study", str(folder), "--name", "mine"]):
         assert bring([str(path), *bad]) == 1
     assert bring([str(tmp_path / "none.h5")]) == 1 and bring([]) == 1
     assert "Traceback" not in capsys.readouterr().err
@@ -120,3 +124,16 @@ def test_worked_example(tmp_path):
     subprocess.run([sys.executable, ROOT / "docs" / "examples" / "outside_result.py", "r.h5", "mine.h5"], cwd=tmp_path, check=True)
     done = subprocess.run([TESTBED, "import", "mine.h5"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0 and "my-code on elastic_column" in done.stdout and "displacement l2" in done.stdout, done.stderr
+
+
+def test_what_another_code_writes_oddly_is_no_traceback(tmp_path, capsys):
+    path = write_result(tmp_path / "mine.h5", variant="my-code", sealed=False, probes=())
+    with h5py.File(path, "a") as file:
+        file["history/probes/tip/displacement"] = [0.0, 1.0]
+        name = sorted(file["snapshots"])[-1]
+        file[f"snapshots/{name}/odd"] = 1.0
+    assert bring([str(path)]) == 1 and "single number" in capsys.readouterr().err
+    with h5py.File(path, "a") as file:
+        del file[f"snapshots/{name}/odd"]
+        file["scene"].attrs["resolved"] = "damping = 0.5\n" + file["scene"].attrs["resolved"]
+    build([path], tmp_path / "out", "c")

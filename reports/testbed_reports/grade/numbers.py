@@ -56,19 +56,18 @@ def taken(take, runs, quantity, norm):
     return ([order] if math.isfinite(order) else []), lost
 
 
-def ratios(take, runs, below, quantity, norm):
-    """The same over that of the runs `below`; of each run over the mean of those that share its setting, as far as these have several."""
+def ratios(take, runs, below, quantity, norm, changed):
+    """The same over that of the runs `below`; of each run over the mean of those that share its setting, as far as these have several
+    beside the keys that are `changed`."""
     if take != "every":
         (top, lost), (base, lost_below) = taken(take, runs, quantity, norm), taken(take, below, quantity, norm)
         return [v / base[0] for v in top] if base and base[0] else [], lost + lost_below
-    keys = [k for k in dict.fromkeys(k for run in below for k in run.values) if k not in NO_SETTING and len({str(run.values.get(k)) for run in below}) > 1]
+    keys = [k for k in dict.fromkeys(k for run in below for k in run.values) if k not in (*NO_SETTING, *changed, "variant", "method", "ppc") and len({str(run.values.get(k)) for run in below}) > 1]
     found, lost = [], [run for run in runs + below if not math.isfinite(value_of(run, quantity, norm))]
     for run in runs:
         pair = [value_of(b, quantity, norm) for b in below if all(same(b.values.get(k), run.values.get(k)) for k in keys)]
         pair = [v for v in pair if math.isfinite(v)]
-        if not pair or not statistics.fmean(pair):
-            lost.append(run)
-        elif run not in lost:
+        if math.isfinite(value_of(run, quantity, norm)) and pair and statistics.fmean(pair):
             found.append(value_of(run, quantity, norm) / statistics.fmean(pair))
     return found, list({id(run): run for run in lost}.values())
 
@@ -78,13 +77,26 @@ def _text(values, digits):
     return low if low == high else f"{low} to {high}"
 
 
+def mean_of_seeds(pairs, digits):
+    """'mean ± standard deviation (n seeds)' of (seed, value), repeats of a seed taken together; '' of less than two seeds."""
+    by_seed = {}
+    for seed, value in pairs:
+        if math.isfinite(value):
+            by_seed.setdefault(str(seed), []).append(value)
+    means, seeds = [statistics.fmean(values) for values in by_seed.values()], len({str(seed) for seed, _ in pairs})
+    if len(means) < 2:
+        return ""
+    of = f"{len(means)} of {seeds}" if len(means) < seeds else f"{seeds}"
+    return f"{number(statistics.fmean(means), digits)} ± {number(statistics.stdev(means), 2)} ({of} seeds)"
+
+
 def _of_seeds(runs, values, digits):
     """'mean ± standard deviation (n seeds)' of runs that differ by their seeds alone; '' for others."""
     settings = {tuple((k, str(v)) for k, v in run.values.items() if k not in NO_SETTING and not k.endswith(".seed")) for run in runs}
     seeds = {str(run.values.get("seed", "")) for run in runs}
-    if len(settings) > 1 or len(seeds) < 2 or len(values) < 2:
+    if len(settings) > 1 or len(seeds) < 2:
         return ""
-    return f"{number(statistics.fmean(values), digits)} ± {number(statistics.stdev(values), 2)} ({len(values)} seeds)"
+    return mean_of_seeds([(run.values.get("seed", ""), value) for run, value in zip(runs, values)], digits)
 
 
 def _is_left_out(study, where):
@@ -96,19 +108,19 @@ def number_of(study, entry):
     quantity, norm, take, scale, offset = (entry[k] for k in ("quantity", "norm", "take", "scale", "offset"))
     below_where = {**entry["where"], **entry.get("over", {})}
     runs, below = study.select(entry["where"]), study.select(below_where) if "over" in entry else []
-    found = Number("?", (), study.name, quantity, norm, take, [r.id for r in runs], [r.id for r in below], scale, offset,
+    found = Number("?", (), study.name, quantity, norm, "each over its partner" if take == "every" and "over" in entry else take, [r.id for r in runs], [r.id for r in below], scale, offset,
                    suspect=sum(run.suspect for run in runs + below))
     what = f"{quantity} {norm}".rstrip()
     for chosen, where in ((runs, entry["where"]), *([(below, below_where)] if "over" in entry else [])):
         if not chosen:
             return replace(found, left_out=_is_left_out(study, where), missing=f"no run to take {what} from: 'where' chooses none")
-    values, lost = ratios(take, runs, below, quantity, norm) if "over" in entry else taken(take, runs, quantity, norm)
+    values, lost = ratios(take, runs, below, quantity, norm, entry["over"]) if "over" in entry else taken(take, runs, quantity, norm)
     failed = [run for run in lost if run.status in FINISHED and not run.completed]
     told = ", ".join(f"{run.id} {run.label if not run.completed else 'has none'}" for run in lost[:3]) + (f" and {len(lost) - 3} more" if len(lost) > 3 else "")
     if not values:
         return replace(found, failed=bool(failed) and len(failed) == len(lost), missing=f"no {what}" + (f": {told}" if told else ""))
     values = [v * scale + offset for v in values]
-    text = _of_seeds(runs, values, entry["digits"]) if take == "every" and "over" not in entry else ""
+    text = _of_seeds(runs, [value_of(run, quantity, norm) * scale + offset for run in runs], entry["digits"]) if take == "every" and "over" not in entry else ""
     return replace(found, text=text or _text(values, entry["digits"]), values=tuple(sorted({min(values), max(values)})), failed=len(failed) == len(lost) > 0,
                    missing=f"no {what} of {told}" if lost else "")
 

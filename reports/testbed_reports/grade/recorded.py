@@ -12,9 +12,12 @@ def recorded(result):
                                   (result.support, result.supports, "reaction")):
         for name in names:
             try:
-                last = kind(name, quantity)[-1]
-            except (ResultError, IndexError):  # a support has no displacement, an outside code may record less
+                values = kind(name, quantity)
+            except ResultError:  # a support has no displacement, an outside code may record less
                 continue
+            if values.ndim != 2 or not len(values):
+                continue
+            last = values[-1]
             rows.update({(f"{quantity}_end", f"{name}.{axis}"): float(value) for axis, value in zip("xy", last)})
     if "unknowns" in result.performance:
         rows["unknowns", ""] = float(result.performance["unknowns"])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from ..draw.drawing import name_of
 from ..draw.work_precision import ACCURACIES, cheapest, costs_of
 from ..grade import metrics
+from ..grade.dataset import groups
 from ..grade.limits import STEP_KEYS
 from ..grade.numbers import Number, number_of, taken
 from ..grade.targets import NOT_CONVERGING_ORDER, graded, in_sizes, number
@@ -58,6 +59,12 @@ def _about(study, where, quantity, norm):
     return f"{words(quantity, norm)}, {case.replace('_', ' ')}" + (f" ({choice})" if choice else "")
 
 
+def _range(target):
+    """' for L 0.5 to 2' of a target that is restricted to some sizes."""
+    ends = [f"{target[k]:g}" if k in target else "..." for k in ("L_from", "L_to")]
+    return f" for L {' to '.join(ends)}" if {"L_from", "L_to"} & set(target) else ""
+
+
 def _slopes(study):
     """Questions for orders and exponents: those that targets ask, of every method."""
     found = {}
@@ -67,10 +74,8 @@ def _slopes(study):
             continue
         quantity, norm = target["quantity"], target.get("norm", "")
         where = {k: v for k, v in target["where"].items() if k not in BY_METHOD}
-        key = (kind, quantity, norm, str(where))
-        if key in found and not {"L_from", "L_to"} & set(target):
-            continue
-        about = _about(study, where, quantity, norm)
+        key = (kind, quantity, norm, str(where), target.get("L_from"), target.get("L_to"))
+        about = _about(study, where, quantity, norm) + _range(target)
         question = Question(f"{'Exponent of L' if kind == 'exponent' else 'Order'}: {about}", about, kind,
                             table_anchor(study, f"power_law_{quantity}" if kind == "exponent" else f"{quantity}_{norm}".strip("_")))
         for variant, runs in _variants(study.select(where)).items():
@@ -79,17 +84,23 @@ def _slopes(study):
                 continue
             lost = any(not run.completed for run in runs)
             values, _ = taken(kind, runs, quantity, norm)
+            settings = groups(runs)
+            if len(settings) > 1 and kind == "order":  # of several settings the order of each
+                values = [v for own in settings.values() for v in taken(kind, own, quantity, norm)[0]]
             most = max((abs(v) for run in runs if math.isfinite(v := run.value(quantity, norm))), default=0)
-            if kind == "order" and values and most <= metrics.ROUNDING:
+            if kind == "order" and any(run.completed for run in runs) and not lost and most <= metrics.ROUNDING and any((quantity, norm) in run.rows for run in runs):
                 question.cells[variant] = "exact"
             elif values:
-                question.cells[variant] = Number(f"{values[0]:.2f}" + marks(runs, lost), (values[0],), study.name, quantity, norm, kind,
+                text = " to ".join(dict.fromkeys(f"{v:.2f}" for v in (min(values), max(values))))
+                question.cells[variant] = Number(text + marks(runs, lost), tuple(sorted({min(values), max(values)})), study.name, quantity, norm, kind,
                                                  [run.id for run in runs])
             else:
                 question.cells[variant] = next((run.status for run in runs if not run.completed), "n/a")
         numbers = {v: c.values[0] for v, c in question.cells.items() if isinstance(c, Number)}
-        if kind == "order" and numbers:
-            question.best = [v for v, value in numbers.items() if value >= max(numbers.values()) - 0.05]
+        whole = {v: value for v, value in numbers.items() if not question.cells[v].text.endswith(("*", "‡"))}
+        exact = [v for v, c in question.cells.items() if c == "exact"]
+        if kind == "order":
+            question.best = exact or [v for v, value in whole.items() if value >= max(whole.values()) - 0.05]
         if question.cells:
             found[key] = question
     return list(found.values())
@@ -100,12 +111,13 @@ def marks(runs, lost=False):
     return (" *" if lost else "") + (" ‡" if any(run.suspect for run in runs) else "")
 
 
-def lasting(costs, accuracy):
-    """The settings from whose cell size on, to finer ones, the best error of each size is at most `accuracy`: a single lucky size is none."""
+def lasting(costs, runs, accuracy):
+    """The settings from whose cell size on, to finer ones, the best error of each size that ran is at most `accuracy`: a lucky size is none, nor
+    is one below which the method fails."""
     kept = []
-    for size in sorted({c.L or 0 for c in costs}):
+    for size in sorted({run.values.get("L") or 0 for run in runs}):
         own = [c for c in costs if (c.L or 0) == size]
-        if min(c.error for c in own) > accuracy:
+        if min((c.error for c in own), default=math.inf) > accuracy:
             break
         kept += own
     return kept
@@ -126,20 +138,20 @@ def _reaches(study):
     for entry in figures:
         quantity, norm = entry["quantity"], entry.get("norm", "")
         about = _about(study, entry["where"], quantity, norm)
-        costs = {v: [c for c in costs_of(runs, entry, study.plan.get("cores"))[0] if not any(run.suspect for run in c.runs)] for v, runs in _variants(study.select(entry["where"])).items()}
+        every = _variants(study.select(entry["where"]))
+        costs = {v: [c for c in costs_of(runs, entry, study.plan.get("cores"))[0] if not any(run.suspect for run in c.runs)] for v, runs in every.items()}
         for accuracy in ACCURACIES:
             question = Question(f"Seconds to {100 * accuracy:g} %: {about}", about, f"{100 * accuracy:g} %", figure_anchor(names[id(entry)]))
             for variant, own in costs.items():
-                best = cheapest(lasting(own, accuracy), accuracy)
+                best = cheapest(lasting(own, every[variant], accuracy), accuracy)
                 if best is None:
-                    question.cells[variant] = "not reached"
+                    question.cells[variant] = "missing" if all(run.result is None for run in every[variant]) else "not reached"
                     continue
                 question.cells[variant] = Number(number(best.solve_s, 2) + (" busy" if best.busy else "") + (" †" if is_static(best.runs[0]) else ""), (best.solve_s,), study.name, "solve_s",
                                                  "", "median", [r.id for r in best.runs])
             times = {v: c.values[0] for v, c in question.cells.items() if isinstance(c, Number) and not c.text.endswith(("†", "busy"))}
             question.best = [v for v, t in times.items() if t == min(times.values())]
-            if times:
-                found.append(question)
+            found.append(question)
     return found
 
 
@@ -223,7 +235,9 @@ def _fastest(rows):
     """Who reaches each accuracy first."""
     said = []
     for goal in dict.fromkeys(q.goal for q in rows if q.goal.endswith("%")):
-        asked = [q for q in rows if q.goal == goal]
+        asked = [q for q in rows if q.goal == goal and q.best]
+        if not asked:
+            continue
         wins = Counter(v for q in asked for v in q.best)
         parts = []
         for variant, _ in wins.most_common():

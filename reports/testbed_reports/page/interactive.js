@@ -20,13 +20,11 @@ function showTip(event, point) {
 
 // The nearest point of a figure within a few pixels; a click leads to its run.
 function hover(canvas, points) {
-  const near = d3.quadtree(points, p => p.x, p => p.y);
   const find = event => {
     const box = canvas.select("svg").node().getBoundingClientRect();
-    const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
-    const visible = p => !canvas.select(`[data-series="${CSS.escape(p.gid)}"].off`).node();
-    const found = near.find(x, y, 24 / box.width);
-    return found && visible(found) && Math.abs(found.y - y) * box.height < 24 ? found : null;
+    const [x, y] = [event.clientX - box.left, event.clientY - box.top];
+    const visible = points.filter(p => !canvas.select(`[data-series="${CSS.escape(p.gid)}"].off`).node());
+    return d3.quadtree(visible, p => p.x * box.width, p => p.y * box.height).find(x, y, 24) || null;
   };
   canvas.on("pointermove", event => {
     const point = find(event);

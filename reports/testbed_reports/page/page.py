@@ -16,8 +16,8 @@ def inline_svg(figure):
     return "data:image/svg+xml;base64," + base64.b64encode(out.getvalue()).decode()
 
 
-_NAMED = re.compile(r' id="(?!series:)[A-Za-z]\w*_\d+"')  # of groups that nothing refers to
-_SERIES = re.compile(r' id="series:([^"]*)"')
+_NAMED = re.compile(r' id="(?!series:)([^"]*)"')
+_SERIES = re.compile(r""" id=(["'])series:(.*?)\1""")
 
 
 def live_svg(figure, name):
@@ -26,8 +26,15 @@ def live_svg(figure, name):
     with plt.rc_context({"svg.hashsalt": name}):
         figure.savefig(out, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
     text = out.getvalue().decode()
-    text = _NAMED.sub("", text[text.index("<svg"):])
-    return _SERIES.sub(lambda m: f' data-series="series:{m[1]}" data-label="{m[1]}"', text)
+    text = text[text.index("<svg"):]
+    asked = set(re.findall(r'href="#([^"]*)"|url\(#([^)]*)\)', text))
+    asked = {name for pair in asked for name in pair if name}
+    text = _NAMED.sub(lambda m: m[0] if m[1] in asked else "", text)  # of groups that nothing refers to
+
+    def named(match):
+        label = match[2].replace('"', "&quot;")
+        return f' data-series="series:{label}" data-label="{label}"'
+    return _SERIES.sub(named, text)
 
 
 def scripts():

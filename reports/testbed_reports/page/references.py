@@ -9,7 +9,7 @@ def used(run):
     """What a run uses, in the keywords of the list: method, variant, options of it, case, local damping, nonlocal softening."""
     scene = run.result.resolved
     words = {run.result.method, run.name.split("[")[0], str(run.values.get("case", "")), *re.findall(r"[\[,]\s*\w+\s*=\s*(\w+)", run.name)}
-    if (scene.get("damping") or {}).get("local"):
+    if isinstance(scene.get("damping"), dict) and scene["damping"].get("local"):
         words.add("local damping")
     softening = [m.get("softening") for m in scene.get("material", []) if isinstance(m.get("softening"), dict)]
     return words | ({"nonlocal"} if any("length" in table for table in softening) else set())

@@ -185,7 +185,7 @@ def _first_screen(studies, sections, claims, verdicts, ledger):
             "claims": Counter(claim.verdict for claim in claims),
             "bad": Counter(run.status if not run.completed else "suspect" for _, run in bad),
             "which": list(dict.fromkeys(f"{run.name} ({run.values.get('case') or name})" if run.result is not None else run.id for name, run in bad)),
-            "silent": silent, "cases": [(study.spec.title, study_anchor(study)) for study in studies if study.spec.cases]}
+            "plain": sum(len(study.runs) for study in studies if not study.spec.cases), "silent": silent, "cases": [(study.spec.title, study_anchor(study)) for study in studies if study.spec.cases]}
 
 
 def build(folders, out, command, unreadable=None, against=None):
@@ -193,6 +193,7 @@ def build(folders, out, command, unreadable=None, against=None):
     made; `against`: a folder of studies to compare with."""
     out, folders, failures, ledger = Path(out), [Path(folder) for folder in folders], [], Ledger()
     unreadable = [] if unreadable is None else unreadable
+    others = [read_study_folder(folder) for folder in find_studies([against])] if against else []  # first: what cannot be read ends it
     studies = _read(folders, failures, unreadable)
     for name in ("figures", "tables"):
         (out / name).mkdir(parents=True, exist_ok=True)
@@ -215,7 +216,7 @@ def build(folders, out, command, unreadable=None, against=None):
                  e.get("reason", "")] for s in studies for e in s.left_out]
     titles = [section["title"] for section in sections]
     title = titles[0] if len(titles) == 1 else "Testbed report"
-    moved = moved_table(studies, [read_study_folder(folder) for folder in find_studies([against])]) if against else None
+    moved = moved_table(studies, others) if against else None
     if moved:
         write_table(out, "report", moved)
     write_atomically(out / "references.bib", references(studies))

@@ -11,6 +11,7 @@ from ..draw.work_precision import is_busy, reach
 from ..grade import metrics
 from ..grade.convergence import fit_order, fit_power, pairwise_orders
 from ..grade.dataset import groups
+from ..grade.numbers import mean_of_seeds
 from ..grade.targets import digits_of, graded, mean_by_size, number, values_by_size
 
 
@@ -25,18 +26,8 @@ def _range(values, digits=3):
 
 def told(runs, key):
     """The metric `key` of some runs in words: 'mean ± standard deviation (n)' over seeds, else the median of repeats and their range."""
-    digits = digits_of(*key)
-    by_seed = {}
-    for run in runs:
-        if math.isfinite(run.value(*key)):
-            by_seed.setdefault(str(run.values.get("seed", "")), []).append(run.value(*key))
-    seeds = {str(run.values.get("seed", "")) for run in runs}
-    if len(seeds) < 2 or not by_seed:
-        return _range([run.value(*key) for run in runs], digits)
-    means = [statistics.fmean(values) for values in by_seed.values()]
-    spread = f" ± {number(statistics.stdev(means), 2)}" if len(means) > 1 else ""
-    return f"{number(statistics.fmean(means), digits)}{spread} ({len(means)} of {len(seeds)} seeds)" if len(means) < len(seeds) else \
-        f"{number(statistics.fmean(means), digits)}{spread} ({len(means)} seeds)"
+    return mean_of_seeds([(run.values.get("seed", ""), run.value(*key)) for run in runs], digits_of(*key)) or \
+        _range([run.value(*key) for run in runs], digits_of(*key))
 
 
 def unit_of(quantity, norm):

@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -79,7 +80,8 @@ def run_by_snakemake(tasks, jobs, tell, folder, engine, options, quiet):
     process = subprocess.Popen(command, cwd=home, stdout=sys.stderr)
     try:
         process.wait()
-    except KeyboardInterrupt:  # Snakemake has it, too, and stops its jobs
+    except KeyboardInterrupt:  # Snakemake stops its jobs then
+        process.send_signal(signal.SIGINT)
         process.wait()
         raise KeyboardInterrupt([_outcome(home, task) for task in tasks]) from None
     outcomes = [_outcome(home, task) for task in tasks]

@@ -1,5 +1,6 @@
 """`testbed import`: whether a result of another code can be used, what it lacks, and into which study it goes."""
 import argparse
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -38,6 +39,9 @@ def _shapes(result):
     told, sizes = [], {}
     for name in sorted(result.final.fields) if result.snapshots else []:
         values = result.final[name]
+        if not values.ndim:
+            told.append(f"the last snapshot's {name} is a single number, not one for each point")
+            continue
         sizes.setdefault(len(values), []).append(name)
         if not np.isfinite(values).all():
             told.append(f"the last snapshot's {name} is not finite everywhere")
@@ -79,9 +83,11 @@ def main(arguments=None):
             folder = Path(options.study)
             if not (folder / "study.toml").is_file():
                 raise ResultError(f"{folder}: no folder of a study (no study.toml)")
-            if OWN_RUN.search(name[-14:]) or "/" in name:
-                raise ResultError(f"--name {name}: must be a file's name and not end as those of the study's own runs")
+            if OWN_RUN.search(name[-14:]) or not re.fullmatch(r"[\w+=-][\w.+=-]*", name):
+                raise ResultError(f"--name {name}: must be letters, digits and . _ + = -, and not end as those of the study's own runs")
             home = folder / "runs" / name
+            if home.exists():
+                raise ResultError(f"{home}: is there already; take it away, or give another --name")
             home.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(options.result, home / "result.h5")
             print(f"{home / 'result.h5'}")

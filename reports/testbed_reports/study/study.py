@@ -246,6 +246,10 @@ def parse_arguments(arguments):
     options = parser.parse_args(arguments)
     if options.jobs < 1:
         parser.error("-j must be at least 1")
+    try:
+        shlex.split(options.snakemake)
+    except ValueError as error:
+        parser.error(f"--snakemake: {error}")
     return options
 
 
