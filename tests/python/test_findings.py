@@ -264,7 +264,7 @@ def test_seeds_are_mean_spread_and_number(tmp_path):
     build([folder], tmp_path / "out", "testbed report column")
     table = list(csv.reader(open(tmp_path / "out" / "tables" / "column_stress_l2.csv", newline="")))
     assert re.match(r"0\.\d+ ± 0\.\d+ \(2 seeds\)$", table[1][1]), table
-    reach = (tmp_path / "out" / "tables" / "column_reach_stress.csv").read_text()
+    reach = (tmp_path / "out" / "tables" / "column_reach_stress_l2.csv").read_text()
     assert re.search(r"mpm-linear.*no number", reach) and "best 15 %" in reach.replace("best 14 %", "best 15 %")
 
 

@@ -68,6 +68,13 @@ def test_paper(tmp_path):
 
 def test_words_for_latex():
     assert escape("† ± ² τ") == r"$\dagger$ $\pm$ $^2$ $\tau$" and escape("…") == r"\ldots{}"
+    assert escape("Müller σ → Δ λ") == r"Müller $\sigma$ ? $\Delta$ $\lambda$"
+
+
+def test_two_studies_of_one_name(tmp_path, capsys):
+    folders = [write_study(tmp_path / name / "column", sizes=(2.0, 1.0), metrics="stress") for name in ("a", "b")]
+    assert main([*map(str, folders), "-o", str(tmp_path / "out")]) == 1
+    assert "two studies are called 'column'" in capsys.readouterr().err
 
 
 def test_what_moved(tmp_path, capsys):

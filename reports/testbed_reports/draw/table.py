@@ -3,6 +3,7 @@ import csv
 import io
 import math
 import re
+import unicodedata
 from dataclasses import dataclass, field
 
 
@@ -41,10 +42,21 @@ def escape(text):
             return rf"${mantissa}\times10^{{{int(exponent)}}}$"
     except ValueError:
         pass
-    text = "".join(_LATEX.get(c, c) for c in text)
-    return text.encode("ascii", "replace").decode() if not text.isascii() else text
+    return "".join(_LATEX.get(c) or (c if c.isascii() else _other(c)) for c in text)
 
 
+def _other(c):
+    """Letters of Latin as they are, which LaTeX reads as UTF-8; Greek ones by their names; '?' for what has neither."""
+    name = unicodedata.name(c, "")
+    if name.startswith("LATIN "):
+        return c
+    greek = re.fullmatch(r"GREEK (SMALL|CAPITAL) LETTER ([A-Z]+)", name)
+    word = greek and (greek[2].lower() if greek[1] == "SMALL" else greek[2].capitalize()).replace("lamda", "lambda").replace("Lamda", "Lambda")
+    return rf"$\{word}$" if word in LETTERS else "?"
+
+
+LETTERS = {*"alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi omega".split(),
+           *"Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega".split()}  # that LaTeX has
 LINE = 104  # characters of a line of 174 mm in \footnotesize
 GAP = 3  # between two columns
 ROWS = 50  # of a page

@@ -136,6 +136,9 @@ def _read(folders, failures, unreadable):
         except StudyError as error:
             failures.append([folder.name, "the whole study", "unreadable", str(error).replace(str(folder) + os.sep, "")])
             unreadable.append(str(error))
+    twice = next((name for name, n in Counter(slug(study.name) for study in studies).items() if n > 1), None)
+    if twice:
+        raise StudyError(f"two studies are called '{twice}', and so would be their figures and tables: report on one, and --against the other")
     for study in studies:
         failures += [[study.name, name, "of another code", "no run of the study's plan: its result lies in runs/ and is taken"] for name in study.outside]
         for run in study.runs:

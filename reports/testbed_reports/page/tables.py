@@ -172,7 +172,7 @@ def reach_table(study, entry):
     """'To reach 1 %, 0.1 %: which method, which L, how long' for a figure of error against time."""
     header, rows, notes = reach(study, entry)
     what = entry.get("title") or f"{entry['quantity']} {entry.get('norm', '')}".replace("_", " ").strip()
-    return Table(f"reach_{entry.get('name') or entry['quantity']}", f"To reach an accuracy: {what[:1].lower() + what[1:]}", header, rows, notes=notes)
+    return Table(f"reach_{entry.get('name') or entry['quantity'] + '_' + entry.get('norm', '')}".rstrip("_"), f"To reach an accuracy: {what[:1].lower() + what[1:]}", header, rows, notes=notes)
 
 
 def targets_table(verdicts):
