@@ -64,11 +64,12 @@ class Run:
     def value(self, quantity, norm=""):
         """The metric, or what was recorded last; nan when the run has none."""
         if (quantity, norm) not in self.rows and quantity in QUANTITIES:
-            return self._recorded.get((quantity, norm), math.nan)
+            return self.recorded.get((quantity, norm), math.nan)
         return self.rows.get((quantity, norm), math.nan)
 
     @cached_property
-    def _recorded(self):
+    def recorded(self):
+        """What probes and supports of a completed run recorded last."""
         return recorded(self.result) if self.completed and self.result is not None else {}
 
 
@@ -93,6 +94,10 @@ class Study:
 
     def select(self, where):
         return [run for run in self.runs if matches(run.values, where)]
+
+    def left_out_of(self, where):
+        """The combinations that a `where` chooses and that could not be run."""
+        return [e for e in self.left_out if matches({**e.get("axes", {}), **{k: e.get(k) for k in ("variant", "method", "L", "case")}}, where)]
 
     def variants(self):
         return list(dict.fromkeys(run.name for run in self.runs))

@@ -4,7 +4,6 @@ import io
 import math
 
 from .dataset import NO_SERIES
-from .recorded import recorded
 
 RUN = ("run_id", "case", "method", "variant", "L", "ppc", "dt", "seed")
 NUMBER = ("quantity", "norm", "value", "solve_s", "particle_steps", "status", "soundness", "cause", "remedy")
@@ -32,6 +31,6 @@ def metrics_csv(runs):
                _number(run.values["dt"]), run.values["seed"], *(run.values.get(key, "") for key in axes)]
         last = [_number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")), run.status, run.result.soundness,
                 run.result.cause, run.result.remedy]
-        for (quantity, norm), value in {**run.rows, **recorded(run.result)}.items():
+        for (quantity, norm), value in {**run.rows, **run.recorded}.items():
             writer.writerow([*own, quantity, norm, repr(float(value)), *last])
     return out.getvalue()

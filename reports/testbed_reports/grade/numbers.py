@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..read.results import FINISHED
-from ..read.study_file import matches, same
+from ..read.study_file import same
 from .convergence import fit_order
 from .targets import mean_by_size, number, values_by_size
 
@@ -99,10 +99,6 @@ def _of_seeds(runs, values, digits):
     return mean_of_seeds([(run.values.get("seed", ""), value) for run, value in zip(runs, values)], digits)
 
 
-def _is_left_out(study, where):
-    return any(matches({**e.get("axes", {}), **{k: e.get(k) for k in ("variant", "method", "L", "case")}}, where) for e in study.left_out)
-
-
 def number_of(study, entry):
     """The number that a [[number]] or a [[claim.test]] asks for; where it cannot be made, or not of all its runs, `missing` says why."""
     quantity, norm, take, scale, offset = (entry[k] for k in ("quantity", "norm", "take", "scale", "offset"))
@@ -113,7 +109,7 @@ def number_of(study, entry):
     what = f"{quantity} {norm}".rstrip()
     for chosen, where in ((runs, entry["where"]), *([(below, below_where)] if "over" in entry else [])):
         if not chosen:
-            return replace(found, left_out=_is_left_out(study, where), missing=f"no run to take {what} from: 'where' chooses none")
+            return replace(found, left_out=bool(study.left_out_of(where)), missing=f"no run to take {what} from: 'where' chooses none")
     values, lost = ratios(take, runs, below, quantity, norm, entry["over"]) if "over" in entry else taken(take, runs, quantity, norm)
     failed = [run for run in lost if run.status in FINISHED and not run.completed]
     told = ", ".join(f"{run.id} {run.label if not run.completed else 'has none'}" for run in lost[:3]) + (f" and {len(lost) - 3} more" if len(lost) > 3 else "")

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..read.study_file import matches
 from . import metrics
 from .convergence import fit_order
 from .dataset import groups
@@ -178,9 +177,7 @@ def judge(target, study):
     runs = [run for run in study.select(target.get("where", {})) if in_sizes(run, target)]
     base = {"label": target["label"], "asked": asked(target), "source": target.get("source", "")}
     if not runs:
-        left_out = [e for e in study.left_out
-                    if matches({**e.get("axes", {}), "variant": e.get("variant"), "method": e.get("method"),
-                                "L": e.get("L"), "case": e.get("case")}, target.get("where", {}))]
+        left_out = study.left_out_of(target.get("where", {}))
         if left_out:
             return Verdict(**base, measured="n/a", verdict="not run", note=left_out[0].get("reason", "left out"))
         return Verdict(**base, measured="n/a", verdict="fail", note="no run")

@@ -10,10 +10,10 @@ from ..grade.dataset import groups
 from ..grade.limits import STEP_KEYS
 from ..grade.numbers import Number, number_of, taken
 from ..grade.targets import NOT_CONVERGING_ORDER, graded, in_sizes, number
+from ..read.number_tables import DEFAULTS
 from .names import figure_anchor, figure_names, study_anchor, table_anchor
 
 BY_METHOD = ("method", "variant")
-PLAIN = {"take": "every", "scale": 1, "offset": 0, "digits": 3}
 
 
 @dataclass
@@ -166,7 +166,7 @@ def _values(study):
         about = _about(study, where, quantity, norm)
         question = Question(about[:1].upper() + about[1:], about, "value", study_anchor(study))
         for variant, runs in _variants(study.select(where)).items():
-            made = number_of(study, {**PLAIN, "quantity": quantity, "norm": norm, "where": {**where, "variant": variant}})
+            made = number_of(study, {**DEFAULTS, "quantity": quantity, "norm": norm, "where": {**where, "variant": variant}})
             if quantity != "modulus" and any(map(is_elastic, runs)):
                 question.cells[variant] = "elastic"
             elif made.values:

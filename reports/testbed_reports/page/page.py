@@ -9,23 +9,28 @@ import jinja2
 from ..draw.style import plt
 
 
+def address(svg):
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode()
+
+
 def inline_svg(figure):
     """The figure as a data address of SVG."""
     out = io.BytesIO()
     figure.savefig(out, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(out.getvalue()).decode()
+    return address(out.getvalue())
 
 
 _NAMED = re.compile(r' id="(?!series:)([^"]*)"')
 _SERIES = re.compile(r""" id=(["'])series:(.*?)\1""")
 
 
-def live_svg(figure, name):
-    """The figure as an element of the page: its series carry their names, and what it refers to by an id is its own."""
+def both_svgs(figure, name):
+    """(data address, element of the page) of a figure, from one rendering: in the element series carry their names, and what it refers to by
+    an id is its own."""
     out = io.BytesIO()
     with plt.rc_context({"svg.hashsalt": name}):
         figure.savefig(out, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
-    text = out.getvalue().decode()
+    image, text = address(out.getvalue()), out.getvalue().decode()
     text = text[text.index("<svg"):]
     asked = set(re.findall(r'href="#([^"]*)"|url\(#([^)]*)\)', text))
     asked = {name for pair in asked for name in pair if name}
@@ -34,7 +39,7 @@ def live_svg(figure, name):
     def named(match):
         label = match[2].replace('"', "&quot;")
         return f' data-series="series:{label}" data-label="{label}"'
-    return _SERIES.sub(named, text)
+    return image, _SERIES.sub(named, text)
 
 
 def scripts():

@@ -20,7 +20,7 @@ from . import bench, findings
 from .against import moved_table
 from .ledger import Ledger
 from .names import slug, study_anchor
-from .page import inline_svg, live_svg, render, scripts
+from .page import both_svgs, render, scripts
 from .paper import write_paper
 from .references import references
 from .study_section import PRINT, study_section, write_table
@@ -103,8 +103,9 @@ def _bench_section(path, style, out, ledger, failures):
     with plt.rc_context(RC):
         figure = bench.rates_figure(rows, style)
         figure.savefig(out / "figures" / f"{own}_rates.pdf", **PRINT)
+        image, svg = both_svgs(figure, own)
         caption = f"Fastest of ten slices; full lines one thread, thin lines more. {comment}. Made by: testbed bench"
-        shown = {"title": "Particle-steps per second against the number of points", "image": inline_svg(figure), "svg": live_svg(figure, own), "points": [], "error": "", "width": "page",
+        shown = {"title": "Particle-steps per second against the number of points", "image": image, "svg": svg, "points": [], "error": "", "width": "page",
                  "rem": 62, "anchor": f"figure-{own}_rates", "paper": "", "shows": [], "caption": [caption], "runs": []}
     plt.close("all")
     tables = [t for t in (bench.rates_table(rows), bench.cost_table(rows)) if t]

@@ -9,7 +9,7 @@ from ..draw.table import as_csv, as_latex
 from ..grade.dataset import write_atomically
 from ..read.results import ResultError
 from .names import figure_anchor, figure_names, slug, study_anchor, subject, table_anchor
-from .page import inline_svg, live_svg
+from .page import both_svgs
 from .stability_page import stability_section
 from .tables import study_tables
 
@@ -40,7 +40,7 @@ def _figure(study, entry, name, style, out, ledger, failures):
         with plt.rc_context(RC):
             drawing = draw(study, entry, style)
             drawing.figure.savefig(out / "figures" / f"{name}.pdf", **PRINT)
-            shown["image"], shown["svg"] = inline_svg(drawing.figure), live_svg(drawing.figure, name)
+            shown["image"], shown["svg"] = both_svgs(drawing.figure, name)
             shown["points"] = points_of(drawing, entry)
             inches = drawing.figure.get_figwidth()
             shown["width"], shown["rem"] = "page" if inches > 1.05 * WIDTH["column"] else "column", round(62 / 7 * inches, 1)

@@ -9,6 +9,7 @@ from .study_reader import LIST, NUMBER, TABLE, TEXT, WHOLE
 TAKES = ("every", "mean", "median", "min", "max", "order", "exponent")
 NUMBER_KEYS = {"name": TEXT, "quantity": TEXT, "norm": TEXT, "where": TABLE, "take": TEXT, "over": TABLE, "scale": NUMBER, "offset": NUMBER,
                "digits": WHOLE}
+DEFAULTS = {"norm": "", "where": {}, "take": "every", "scale": 1, "offset": 0, "digits": 3}
 CLAIM_KEYS = {"name": TEXT, "words": TEXT, "source": TEXT, "note": TEXT, "test": LIST}
 TEST_KEYS = {**{key: types for key, types in NUMBER_KEYS.items() if key != "name"}, "if": TEXT, "min": NUMBER, "max": NUMBER}
 
@@ -32,7 +33,7 @@ def _one(reader, entry, keys, table, index, columns):
         entry = {**entry, key: reader.where({"where": entry[key]}, table, index, columns)}
     if "over" in entry and all(k in entry.get("where", {}) and same(entry["where"][k], v) for k, v in entry["over"].items()):
         reader.fail(f"'over' in [[{table}]] number {index + 1} chooses the same runs: name a key and another value", "over", table, index)
-    return {"norm": "", "where": {}, "take": "every", "scale": 1, "offset": 0, "digits": 3, **entry}
+    return {**DEFAULTS, **entry}
 
 
 def read_numbers(reader, columns):
