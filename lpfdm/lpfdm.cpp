@@ -5,6 +5,7 @@
 #include "lpfdm/equations.hpp"
 #include "lpfdm/frontier.hpp"
 #include "lpfdm/initial_velocity.hpp"
+#include "lpfdm/mesh/mesh_lpfdm.hpp"
 #include "lpfdm/options.hpp"
 #include "lpfdm/time_step.hpp"
 
@@ -312,6 +313,8 @@ private:
 
 std::unique_ptr<Solver> make_lpfdm(const Scene& scene)
 {
+    if (scene.options<LpfdmSpec>().has_mesh())
+        return make_mesh_lpfdm(scene);
     switch (scene.options<LpfdmSpec>().support)
     {
     case LpfdmSpec::Support::point: return std::make_unique<Lpfdm<PointSupport>>(scene);

@@ -3,6 +3,8 @@
 
 #include "core/base/choice.hpp"
 
+#include <string>
+
 namespace testbed
 {
 struct LpfdmSpec
@@ -39,10 +41,31 @@ struct LpfdmSpec
             {{Frontier::extrapolate, "extrapolate"}, {Frontier::literal, "literal"}, {Frontier::arrival, "arrival"}});
     }
 
+    enum class Cells
+    {
+        lattice,
+        triangles,
+        quadrilaterals,
+        file
+    };
+    friend constexpr auto names(Cells)
+    {
+        return choice_names<Cells>({{Cells::lattice, "lattice"},
+                                    {Cells::triangles, "triangles"},
+                                    {Cells::quadrilaterals, "quadrilaterals"},
+                                    {Cells::file, "file"}});
+    }
+
     Support support = Support::domain;
     Convection convection = Convection::two_sided;
     Frontier frontier = Frontier::arrival;
     double hourglass = 0.05, volume_cap = 0;
+    Cells cells = Cells::lattice;
+    double shake = 0;
+    int shake_seed = 1;
+    std::string mesh = "";
+
+    bool has_mesh() const { return cells != Cells::lattice; }
 
     template <class V>
     void describe(V& v)
@@ -61,6 +84,15 @@ struct LpfdmSpec
             "volume_cap", volume_cap, "-",
             "support = \"point\": stress counts over at most this many times a point's initial volume: one alone in its cell, grown by "
             "tension, has more stiffness than mass; 0 sets no limit");
+        v.choice(
+            "cells", cells,
+            "lattice: its squares; triangles: two for each of them; quadrilaterals: the squares as a mesh, slow, to be shaken; file: of "
+            "any convex shape. Meshes are for support = \"point\" alone");
+        v.optional("shake", shake, "-",
+                   "nodes of triangles and quadrilaterals are moved at random, by at most this many cells in each direction, at most 0.24; "
+                   "not those at the edges of the lattice, of supports or walls");
+        v.optional("shake_seed", shake_seed, "-", "of the random numbers for that");
+        v.optional("mesh", mesh, "", "cells = \"file\": what `testbed mesh` wrote; its place is relative to the scene's");
     }
 };
 }  // namespace testbed

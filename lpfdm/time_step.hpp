@@ -9,32 +9,39 @@
 
 namespace testbed
 {
+/// What motion adds to the limits of a body at rest.
+/// - stiffness in motion: the lattice sees waves of a moving body at other frequencies, and near its limit some grow.
+/// - convection: the departure point lies in a cell around the node.
+/// @param stiffness limit of the cell [s] @param L a cell's least width [m] @param speed of nodes, largest [m/s]
+inline void add_limits_in_motion(std::vector<StepLimit>& limits, const std::vector<Body>& bodies, double stiffness, double L, double speed)
+{
+    constexpr double in_motion = 0.65, rest = 0.01;             // of L / c_p, measured: docs/methods.md; Courant number of what is at rest
+    double crossing = std::numeric_limits<double>::infinity();  // L / c_p over the limit of the isolated cell
+    for (const Body& body : bodies)
+        crossing = std::min(crossing, std::sqrt(gradient_stiffness(moduli(body.material)) / moduli(body.material).constrained()));
+    if (speed * stiffness > rest * L)
+        limits.push_back({"stiffness in motion", in_motion * crossing * stiffness});
+    if (const auto courant = courant_limit(L, speed))
+        limits.push_back({"convection", *courant});
+}
+
 /// Limits of the present state, each of which holds wherever the points lie in their cells.
 /// - stiffness: the isolated cell. Strain is that of the cell, or for a domain the mean of its cells by their shares w, so that the energy
 ///   is at most sum w V (eps_j : D : eps_j): Irons' theorem on cells of content sum w V with a quarter of their mass at each node.
 /// - hourglass: the force takes the velocity of half a step before; a mode that decays at d = 4 rate turns unstable at d dt = 2. In a cell
 ///   the pattern has no stiffness, so that the two limits do not add.
-/// - stiffness in motion: the lattice sees waves of a moving body at other frequencies, and near its limit some grow.
-/// - convection: the departure point lies in a cell around the node.
 /// @param hourglass_rate chi c_p / L, zero without [1/s] @param alpha of local damping
 inline std::vector<StepLimit> lpfdm_step_limits(const LpfdmGrid<2>& grid, const std::vector<Body>& bodies, double hourglass_rate,
                                                 double alpha)
 {
-    constexpr double in_motion = 0.65, rest = 0.01;  // of L / c_p, measured: docs/methods.md; Courant number of what is at rest
     const double stiffness = isolated_cell_limit(bodies, grid.lattice.cell_size) * damping_factor(alpha);
-    double crossing = std::numeric_limits<double>::infinity();  // L / c_p over the limit of the isolated cell
-    for (const Body& body : bodies)
-        crossing = std::min(crossing, std::sqrt(gradient_stiffness(moduli(body.material)) / moduli(body.material).constrained()));
     std::vector<StepLimit> limits{{"stiffness", stiffness}};
     if (hourglass_rate > 0)
         limits.push_back({"hourglass", 0.5 / (hourglass_rate * (1 + alpha))});
     const auto& active = grid.nodes.active();
     const double speed = parallel_max(active.size(), [&](std::size_t a)
                                       { return std::max(std::abs(grid.nodes.v[0][active[a]]), std::abs(grid.nodes.v[1][active[a]])); });
-    if (speed * stiffness > rest * grid.lattice.cell_size)
-        limits.push_back({"stiffness in motion", in_motion * crossing * stiffness});
-    if (const auto courant = courant_limit(grid.lattice.cell_size, speed))
-        limits.push_back({"convection", *courant});
+    add_limits_in_motion(limits, bodies, stiffness, grid.lattice.cell_size, speed);
     return limits;
 }
 

@@ -7,6 +7,10 @@
 #include <cstddef>
 #include <vector>
 
+/// For a small kernel of plain numbers: inlined into the loops of one and of more threads it would be compiled twice, and products and sums
+/// might be joined in the one and not in the other.
+#define TESTBED_NOINLINE __attribute__((noinline))
+
 namespace testbed
 {
 namespace detail

@@ -31,6 +31,9 @@ public:
         }
     }
 
+    /// What evaluate() found, body after body [m/s^2].
+    const VectorField<2>& at_points() const { return acceleration_at_points_; }
+
     /// Adds the force of all bodies: sink(entity, force) for each active cell or node of `gather`.
     template <class Support, class Sink>
     void apply(const Lattice<2>& lattice, const std::vector<Body>& bodies, const Gather& gather, Sink&& sink)

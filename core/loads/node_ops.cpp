@@ -6,15 +6,15 @@ namespace testbed
 {
 namespace
 {
-Restraint make_boundary(const BoundarySpec& spec, const Scene& scene, const Lattice<2>& lattice)
+Restraint make_boundary(const BoundarySpec& spec, const Scene& scene, const Lattice<2>& lattice, std::span<const Vec<2>> places)
 {
     const Expression where(spec.where, scene.expression_constants());
     Restraint restraint{spec.name, {}};
     for_each_index(all<2>(-1), lattice.size + all<2>(2),
                    [&](const Index<2>& n)
                    {
-                       const Vec<2> x = lattice.node_position(n);
-                       if (!holds_near(where, x[0], x[1], 1e-6 * lattice.cell_size))
+                       const Vec<2> x = places.empty() ? lattice.node_position(n) : places[lattice.node(n)];
+                       if (std::isnan(x[0]) || !holds_near(where, x[0], x[1], 1e-6 * lattice.cell_size))
                            return;
                        for (std::size_t d = 0; d < restraint.components.size(); ++d)
                            if (fixes(spec.fix, d))
@@ -42,14 +42,14 @@ const Restraint* in_the_way(const std::vector<Index<2>>& nodes, const Restraint&
 }
 }  // namespace
 
-NodeOps::NodeOps(const Scene& scene, const Lattice<2>& lattice)
+NodeOps::NodeOps(const Scene& scene, const Lattice<2>& lattice, std::span<const Vec<2>> places)
 {
     if (scene.gravity)
         gravity_ = make_gravity(*scene.gravity);
     if (scene.damping && scene.damping->local > 0)
         damping_ = LocalDamping{scene.damping->local};
     for (const BoundarySpec& spec : scene.boundaries)
-        restraints_.push_back(make_boundary(spec, scene, lattice));
+        restraints_.push_back(make_boundary(spec, scene, lattice, places));
     first_wall_ = restraints_.size();
     for (const WallSpec& spec : scene.walls)
     {

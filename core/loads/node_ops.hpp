@@ -126,8 +126,9 @@ struct RestraintRecord
 class NodeOps
 {
 public:
+    /// @param places of the nodes by number, if they are not where the lattice has them; NaN: there is no such node
     /// @throws SceneError when a boundary takes no node
-    NodeOps(const Scene& scene, const Lattice<2>& lattice);
+    NodeOps(const Scene& scene, const Lattice<2>& lattice, std::span<const Vec<2>> places = {});
 
     /// Gravity takes these masses of the nodes for those that have weight, from now on.
     void weigh_with(const std::vector<double>& mass) { weight_ = &mass; }

@@ -23,10 +23,12 @@ public:
 protected:
     static constexpr int S = Support::S;
 
-    ParticleSolver(const Scene& scene, PointNeeds needs)
+    ParticleSolver(const Scene& scene, PointNeeds needs) : ParticleSolver(scene, needs, NodeOps(scene, make_lattice(scene.grid))) {}
+    /// @param node_ops for nodes that are not those of the lattice
+    ParticleSolver(const Scene& scene, PointNeeds needs, NodeOps node_ops)
         : cloud_(scene, needs.with_initial_position(scene.body_force.has_value())),
           bodies_(cloud_.bodies),
-          node_ops_(scene, make_lattice(scene.grid))
+          node_ops_(std::move(node_ops))
     {
         if (scene.body_force)
             body_force_.emplace(*scene.body_force, scene.expression_constants());

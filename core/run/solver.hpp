@@ -25,14 +25,15 @@ struct MotionSums
 
 /// Sums over nodes whose velocity is `lag` seconds behind their forces. A light node may be accelerated beyond measure for half a step;
 /// the product of the velocities before and after does not take that for motion, as the square at the time of the forces would.
-/// @param internal norm of the internal nodal forces
-inline MotionSums nodal_sums(const Lattice<2>& lattice, const Nodes<2>& nodes, double lag, double internal)
+/// @param place of a node, by its number, from where angular momentum is taken @param internal norm of the internal nodal forces
+template <class Place>
+MotionSums nodal_sums(Place&& place, const Nodes<2>& nodes, double lag, double internal)
 {
     const auto s = ordered_sum<5>(nodes.active().size(),
                                   [&](std::size_t a)
                                   {
                                       const std::size_t i = nodes.active()[a];
-                                      const Vec<2> x = lattice.node_position(i);
+                                      const Vec<2> x = place(i);
                                       const double m = nodes.mass[i], step = inverse_mass(nodes, i) * lag;
                                       const Vec<2> before = at(nodes.v, i);
                                       Vec<2> v;
@@ -40,10 +41,20 @@ inline MotionSums nodal_sums(const Lattice<2>& lattice, const Nodes<2>& nodes, d
                                           v[d] = before[d] + nodes.f[d][i] * step;
                                       const double square = total<2>([&](auto d) { return before[d] * before[d]; });
                                       const double product = total<2>([&](auto d) { return before[d] * v[d]; });
-                                      const double spin = (x[0] - lattice.origin[0]) * v[1] - (x[1] - lattice.origin[1]) * v[0];
+                                      const double spin = x[0] * v[1] - x[1] * v[0];
                                       return std::array{m * (product - 0.5 * square), 0.5 * m * square, m * v[0], m * v[1], m * spin};
                                   });
     return {s[0], s[1], {s[2], s[3]}, s[4], internal > 0 ? force_norm(nodes) / internal : 0};
+}
+
+inline MotionSums nodal_sums(const Lattice<2>& lattice, const Nodes<2>& nodes, double lag, double internal)
+{
+    const auto place = [&](std::size_t i)
+    {
+        const Vec<2> x = lattice.node_position(i);
+        return Vec<2>{x[0] - lattice.origin[0], x[1] - lattice.origin[1]};
+    };
+    return nodal_sums(place, nodes, lag, internal);
 }
 
 /// The motion of the points at the half step before.
