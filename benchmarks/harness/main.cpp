@@ -214,6 +214,7 @@ struct CommandLine
         app.add_subcommand("study", "run a study: testbed study STUDY.toml... [-j N] [-o DIR]");
         app.add_subcommand("report", "report on studies: testbed report DIR... [-o DIR]");
         app.add_subcommand("plot", "picture of results: testbed plot RESULT.h5... [--field F] [-o FILE]");
+        app.add_subcommand("mesh", "a mesh of Gmsh for lpfdm.cells = \"file\": testbed mesh IN.msh OUT.toml");
         app.add_subcommand("import", "check a result of another code: testbed import RESULT.h5 [--study DIR]");
     }
 };
@@ -238,7 +239,7 @@ void point(const std::string& law, const std::string& csv)
 int run(int argc, char** argv)
 {
     // these are programs of their own, found the way git finds its subcommands
-    for (const char* name : {"study", "report", "plot", "import"})
+    for (const char* name : {"study", "report", "plot", "import", "mesh"})
         if (argc > 1 && std::string(argv[1]) == name)
             become(std::string("testbed-") + name, rest_of(argc, argv, 2));
 

@@ -26,7 +26,14 @@ public:
             for (Body& body : bodies_)
                 body.counted_volume = options_.volume_cap * body.points.initial_volume;
         cloud_.sort();
-        find_cells();
+        try
+        {
+            find_cells();
+        }
+        catch (const Diverged& e)
+        {
+            throw SceneError(fmt::format("{}: at the start {}; the mesh must cover the bodies and where they go", scene.path, e.what()));
+        }
         cell_averages(grid_, bodies_, cells_);
         set_initial_velocity(scene);
     }
