@@ -67,6 +67,49 @@ TEST(Nonlocal, EqualsTheSumOverPoints)
     }
 }
 
+/// With points in the middle of their cells: exactly the double sum over cells, in rows that end at edges of the body and of the lattice.
+TEST(Nonlocal, IsTheDoubleSumOverCells)
+{
+    for (const std::string weight : {"gauss", "galavi_schweiger"})
+    {
+        Scene scene = nonlocal_scene(0.15, 1.7, weight);
+        scene.bodies[0].points_per_cell = 1;
+        scene.bodies[0].min = Vec<2>{0, 0.3};
+        const Lattice<2> lattice = make_lattice(scene.grid);
+        auto bodies = make_bodies(scene, lattice, {});
+        std::vector<double> workspace;
+        bodies[0].bins.rebuild<PointSupport>(bodies[0].points, workspace);
+        const auto index = [&](const Index<2>& at) { return lattice.cell(at); };
+        Gather gather(lattice.cells());
+        const std::vector<const Bins<2>*> bins{&bodies[0].bins};
+        gather.rebuild<1, 2>(bins, index);
+        Points<2>& q = bodies[0].points;
+        for (std::size_t p = 0; p < q.count; ++p)
+        {
+            q.plastic_shear[p] = 0.01 * (1 + std::sin(50 * q.x[0][p] + 31 * q.x[1][p]));
+            q.volume[p] *= 1 + 0.3 * std::sin(17 * q.x[1][p]);
+        }
+        NonlocalStrain nonlocal(scene, lattice.cell_size);
+        nonlocal.resize(lattice.cell_stride(), lattice.cells());
+        nonlocal.apply<PointSupport>(lattice, bodies, gather, index);
+        const NonlocalSpec& spec = *scene.materials[0].softening->nonlocal;
+        for (std::size_t p = 0; p < q.count; ++p)
+        {
+            double sum = 0, total = 0;
+            for (std::size_t o = 0; o < q.count; ++o)
+            {
+                const double dx = q.x[0][p] - q.x[0][o], dy = q.x[1][p] - q.x[1][o];
+                if (std::max(std::abs(dx), std::abs(dy)) > 0.55)  // three internal lengths, in whole cells
+                    continue;
+                const double w = nonlocal_weight(spec, std::hypot(dx, dy)) * q.volume[o];
+                sum += w * q.plastic_shear[o];
+                total += w;
+            }
+            ASSERT_NEAR(q.softening_strain[p], std::max(0.0, -0.7 * q.plastic_shear[p] + 1.7 * sum / total), 1e-14) << weight;
+        }
+    }
+}
+
 TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
 {
     const Scene scene = nonlocal_scene(0.4, 1.7, "gauss");

@@ -46,7 +46,10 @@ public:
             first_bin += bodies[b].bins.list().size();
         }
         collect(gather);
-        average(gather.active());
+        if (along_.empty())
+            average_by_distance(gather.active());
+        else
+            average_by_directions(gather.active());
         for (std::size_t b = 0; b < bodies.size(); ++b)
             if (over_nonlocal_[b] > 0)
             {
@@ -62,20 +65,27 @@ public:
     }
     std::size_t bytes() const
     {
-        return (partial_.capacity() + volume_.capacity() + strain_.capacity() + mean_.capacity() + weight_.capacity()) * sizeof(double);
+        return (partial_.capacity() + volume_.capacity() + strain_.capacity() + mean_.capacity() + weight_.capacity() +
+                row_volume_.capacity() + row_strain_.capacity()) *
+               sizeof(double);
     }
 
 private:
     void collect(const Gather& gather);
-    void average(const std::vector<std::uint32_t>& active);
+    /// Means by a weight that is a product of one in each direction: along the rows, then across them.
+    void average_by_directions(const std::vector<std::uint32_t>& active);
+    /// Means by any weight of the distance.
+    void average_by_distance(const std::vector<std::uint32_t>& active);
     /// Zeros before and after volume_ and strain_, so that the weight may reach beyond the lattice.
     std::size_t padding() const { return static_cast<std::size_t>(reach_) * (stride_ + 1); }
 
     std::vector<double> over_nonlocal_;  ///< m by body, zero for a body without
     std::size_t stride_ = 0;
-    int reach_;                                   ///< of the weight [cells]
-    std::vector<double> weight_;                  ///< (2 reach + 1)^2
-    std::vector<double> volume_, strain_, mean_;  ///< by entity; strain: times volume; both padded by the reach of the weight
+    int reach_;                                    ///< of the weight [cells]
+    std::vector<double> weight_;                   ///< (2 reach + 1)^2, or empty
+    std::vector<double> along_;                    ///< 2 reach + 1 of a weight that is a product, or empty
+    std::vector<double> volume_, strain_, mean_;   ///< by entity; strain: times volume; both padded by the reach of the weight
+    std::vector<double> row_volume_, row_strain_;  ///< summed along the rows, padded, too; empty without along_
     std::vector<std::uint32_t> filled_;
     std::vector<double> partial_;
 };
