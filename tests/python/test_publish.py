@@ -1,4 +1,5 @@
 """What a paper needs: an installed program, references, a paper, what moved since before, results of other codes."""
+import json
 import os
 import re
 import shutil
@@ -12,6 +13,7 @@ from conftest import REPORTS
 from synthetic import write_result, write_study
 from testbed_reports.draw.table import escape
 from testbed_reports.page.report import build, main
+from testbed_reports.page.study_section import core_hours
 from testbed_reports.study.outside import main as bring
 
 TESTBED = os.environ.get("TESTBED", "")
@@ -144,3 +146,52 @@ def test_what_another_code_writes_oddly_is_no_traceback(tmp_path, capsys):
         del file[f"snapshots/{name}/odd"]
         file["scene"].attrs["resolved"] = "damping = 0.5\n" + file["scene"].attrs["resolved"]
     build([path], tmp_path / "out", "c")
+
+
+def test_crate_names_what_is_there(tmp_path):
+    """Every file of the report is in the RO-Crate, every id that is referred to has an entity, and a second report counts no crate as a file of its own."""
+    write_study(tmp_path / "study")
+    for _ in range(2):
+        build([tmp_path / "study"], tmp_path / "out", "testbed report")
+    graph = json.loads((tmp_path / "out" / "ro-crate-metadata.json").read_text())["@graph"]
+    ids = {e["@id"]: e for e in graph}
+    root = ids["./"]
+    files = {p.relative_to(tmp_path / "out").as_posix() for p in (tmp_path / "out").rglob("*") if p.is_file()} - {"ro-crate-metadata.json"}
+    assert {part["@id"] for part in root["hasPart"]} == files and "report.html" in files
+    references = [value["@id"] for e in graph for value in e.values() if isinstance(value, dict) and e["@id"] != "ro-crate-metadata.json"]
+    assert set(references) <= set(ids)
+    assert ids["report.html"]["encodingFormat"] == "text/html"
+    assert [ids[m["@id"]]["@type"] for m in root["mentions"]] == ["CreateAction"]
+
+
+FIGURE = '[[figure]]\nkind = "convergence"\nquantity = "stress"\nnorm = "l2"\ncaption = "50 % of a_b & more."\n'
+
+
+@pytest.mark.skipif(not shutil.which("pdflatex"), reason="no pdflatex")
+def test_figures_as_pgf(tmp_path):
+    """LaTeX sets the words: they stand in the file as text."""
+    write_study(tmp_path / "study", FIGURE)
+    assert main([str(tmp_path / "study"), "-o", str(tmp_path / "out"), "--pgf"]) == 0
+    pictures = sorted((tmp_path / "out" / "figures").glob("*.pgf"))
+    assert [p.stem for p in pictures] == [p.stem for p in sorted((tmp_path / "out" / "figures").glob("*.pdf"))] != []
+    assert all("pgfpicture" in p.read_text() for p in pictures)
+
+
+def test_pgf_without_latex_is_told(tmp_path):
+    write_study(tmp_path / "study", FIGURE)
+    done = subprocess.run([sys.executable, REPORTS / "testbed-report", tmp_path / "study", "-o", tmp_path / "out", "--pgf"], env={"PATH": str(tmp_path), "HOME": str(tmp_path)},
+                          capture_output=True, text=True)
+    assert done.returncode == 1 and "no PGF" in done.stderr, done.stderr
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_core_hours():
+    """Solving, setting up and writing, times threads."""
+    class Run:
+        def __init__(self, threads, **seconds):
+            self.result = type("Result", (), {"performance": seconds, "provenance": {"threads": threads}})
+
+    class Lost:
+        result = None
+
+    assert core_hours([Run(2, solve_s=1800.0, setup_s=300.0), Run(1, solve_s=1800.0, output_s=1800.0), Lost]) == pytest.approx(2 * 2100 / 3600 + 1)

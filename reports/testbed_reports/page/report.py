@@ -18,6 +18,7 @@ from ..grade.targets import judge_all
 from ..read.study_file import StudyError
 from . import bench, findings
 from .against import moved_table
+from .crate import write_crate
 from .ledger import Ledger
 from .names import slug, study_anchor
 from .page import both_svgs, render, scripts
@@ -192,9 +193,9 @@ def _first_screen(studies, sections, claims, verdicts, ledger):
             "plain": sum(len(study.runs) for study in studies if not study.spec.cases), "silent": silent, "cases": [(study.spec.title, study_anchor(study)) for study in studies if study.spec.cases]}
 
 
-def build(folders, out, command, unreadable=None, against=None):
+def build(folders, out, command, unreadable=None, against=None, pgf=False):
     """Writes the report of studies into the folder `out`; returns the path of the page. `unreadable`: a list for what could not be read or
-    made; `against`: a folder of studies to compare with."""
+    made; `against`: a folder of studies to compare with; `pgf`: figures as PGF, too."""
     out, folders, failures, ledger = Path(out), [Path(folder) for folder in folders], [], Ledger()
     unreadable = [] if unreadable is None else unreadable
     others = [read_study_folder(folder) for folder in find_studies([against])] if against else []  # first: what cannot be read ends it
@@ -204,7 +205,7 @@ def build(folders, out, command, unreadable=None, against=None):
     benches = [path for path in (folder / bench.FILE for folder in folders) if path.is_file()]
     style = Style(_figure_labels(studies) + _bench_labels(benches))
     verdicts = [(study, judge_all(study)) for study in studies]
-    sections = [study_section(study, style, out, ledger, failures) for study in studies]
+    sections = [study_section(study, style, out, ledger, failures, pgf) for study in studies]
     for (study, judged), section in zip(verdicts, sections):
         for table in [t for _, t in section["tables"]] + ([targets_table(judged)] if judged else []):
             write_table(out, study.name, table)
@@ -240,6 +241,7 @@ def build(folders, out, command, unreadable=None, against=None):
                   failures=Table("failures", "Failures", ["study", "what", "status", "reason"], failures, 4),
                   left_out=Table("left_out", "Left out", ["study", "variant", "combination", "reason"], left_out, 4))
     write_atomically(out / "report.html", page)
+    write_crate(out, title, studies, dict(rows).get("Commit", []))
     return out / "report.html"
 
 
@@ -250,6 +252,7 @@ def main(arguments=None):
     parser.add_argument("folders", nargs="+", metavar="DIR", help="a study's folder, a folder of such, or a result file")
     parser.add_argument("-o", "--output", metavar="OUT", help="default: 'report' beside the first DIR")
     parser.add_argument("--against", metavar="DIR", help="studies of before: what moved beyond the range of its repeats")
+    parser.add_argument("--pgf", action="store_true", help="figures as PGF, too, for a paper's LaTeX to set in its own fonts (needs pdflatex)")
     try:
         options = parser.parse_args(arguments)
     except SystemExit as stop:
@@ -257,7 +260,7 @@ def main(arguments=None):
     out = Path(options.output) if options.output else Path(options.folders[0]).resolve().parent / "report"
     unreadable = []
     try:
-        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]), unreadable, options.against)
+        page = build(options.folders, out, shlex.join(["testbed", "report", *arguments]), unreadable, options.against, options.pgf)
     except (StudyError, OSError) as error:
         print(f"testbed report: {error}", file=sys.stderr)
         return 1

@@ -3,6 +3,7 @@ from collections import Counter
 
 from ..draw.drawing import FigureError
 from ..draw.figures import draw
+from ..draw.pgf import PgfError, save_pgf
 from ..draw.points import points_of
 from ..draw.style import RC, WIDTH, plt
 from ..draw.table import as_csv, as_latex
@@ -29,7 +30,7 @@ def _caption(study, entry, drawing, ledger):
     return ledger.text(study, own) + [(". " if own else "") + ". ".join(notes) + "."]
 
 
-def _figure(study, entry, name, style, out, ledger, failures):
+def _figure(study, entry, name, style, out, ledger, failures, pgf):
     """One figure as the template wants it; drawn for print, too."""
     what = subject(entry)
     title = entry.get("title") or f"{entry['kind']}: {what} {entry.get('norm', '')}".replace("_", " ").strip(" :")
@@ -40,13 +41,15 @@ def _figure(study, entry, name, style, out, ledger, failures):
         with plt.rc_context(RC):
             drawing = draw(study, entry, style)
             drawing.figure.savefig(out / "figures" / f"{name}.pdf", **PRINT)
+            if pgf:
+                save_pgf(drawing.figure, out / "figures" / f"{name}.pgf")
             shown["image"], shown["svg"] = both_svgs(drawing.figure, name)
             shown["points"] = points_of(drawing, entry)
             inches = drawing.figure.get_figwidth()
             shown["width"], shown["rem"] = "page" if inches > 1.05 * WIDTH["column"] else "column", round(62 / 7 * inches, 1)
             shown["caption"] = _caption(study, entry, drawing, ledger)
             shown["runs"] = [run.id for run in drawing.runs]
-    except (FigureError, ResultError) as error:
+    except (FigureError, ResultError, PgfError) as error:
         shown["error"] = str(error)
         failures.append([study.name, f"figure {name}", "not drawn", str(error)])
     finally:
@@ -54,9 +57,15 @@ def _figure(study, entry, name, style, out, ledger, failures):
     return shown
 
 
+def core_hours(runs):
+    """Time on cores of runs that left a result."""
+    own = [run.result for run in runs if run.result is not None]
+    return sum(float(r.performance.get(part, 0)) * float(r.provenance.get("threads", 1)) for r in own for part in ("solve_s", "setup_s", "output_s")) / 3600
+
+
 def _summary(study):
     counts = Counter("suspect" if run.suspect else run.status for run in study.runs)
-    text = f"{len(study.runs)} runs: " + ", ".join(f"{n} {status}" for status, n in counts.items()) + "."
+    text = f"{len(study.runs)} runs: " + ", ".join(f"{n} {status}" for status, n in counts.items()) + f". {core_hours(study.runs):.2g} core hours."
     return text + (f" {len(study.left_out)} combinations left out." if study.left_out else "")
 
 
@@ -67,9 +76,9 @@ def _settings(run):
     return ", ".join(parts)
 
 
-def study_section(study, style, out, ledger, failures):
-    """The content of the section, and the files of its pictures and tables."""
-    figures = [_figure(study, entry, name, style, out, ledger, failures) for entry, name in zip(study.spec.figures, figure_names(study))]
+def study_section(study, style, out, ledger, failures, pgf=False):
+    """The content of the section, and the files of its pictures and tables; `pgf`: figures as PGF, too."""
+    figures = [_figure(study, entry, name, style, out, ledger, failures, pgf) for entry, name in zip(study.spec.figures, figure_names(study))]
     stability, files, runs = None, [], []
     if study.spec.cases:
         stability, tables, files = stability_section(study, style, out, slug(study.name))
