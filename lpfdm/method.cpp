@@ -37,10 +37,14 @@ void check_mesh(const Scene& scene, const LpfdmSpec& lpfdm, Problems& problems)
          "cells that are no lattice have \"upwind\" or \"none\"");
     only(lpfdm.frontier != LpfdmSpec::Frontier::arrival, "lpfdm.frontier", "cells that are no lattice have \"extrapolate\" or \"literal\"");
     only(lpfdm.hourglass == 0, "lpfdm.hourglass", "cells that are no lattice have no hourglass control: 0 is asked");
+    only(!scene.time.sharp_limit, "time.sharp_limit", "not for cells that are no lattice");
     only(scene.tractions.empty(), "traction", "not for cells that are no lattice; use [confinement] for a pressure");
     only(!has_nonlocal_softening(scene), "material", "nonlocal softening is not for cells that are no lattice");
     only(!is_file || scene.walls.empty(), "wall",
          "walls go from line to line of the lattice: not for a mesh from a file; use [[boundary]]");
+    const auto is_smooth = [](const WallSpec& wall) { return wall.motion == WallSpec::Motion::smooth && wall.velocity; };
+    only(lpfdm.cells != Cells::triangles || std::none_of(scene.walls.begin(), scene.walls.end(), is_smooth), "wall",
+         "a wall that moves smoothly finds soil between two nodes of a square: for triangles motion = \"hand_off\" is asked");
     const auto moves = [](const WallSpec& wall) { return wall.velocity.has_value(); };
     only(lpfdm.shake == 0 || std::none_of(scene.walls.begin(), scene.walls.end(), moves), "lpfdm.shake",
          "a wall that moves goes from one straight line of nodes to the next: 0 is asked");
@@ -65,6 +69,11 @@ void warn(const Scene& scene, Problems& problems)
         problems.warn("traction",
                       "domains reach into the cells outside a loaded face, and what they hold there may run away; use [confinement] "
                       "for a pressure, or lpfdm.support = \"point\"");
+    if (scene.options<LpfdmSpec>().cells == Cells::triangles && scene.options<LpfdmSpec>().shake == 0 &&
+        !(scene.damping && scene.damping->local > 0))
+        problems.warn("lpfdm.cells", "points of a body whose faces lie on lines of the lattice lie on the diagonals, too, and change "
+                                     "triangles in the smallest motion, which "
+                                     "makes energy without damping: shift the body by a part of their distance, or use lpfdm.shake");
 }
 
 Traits traits(const Scene& scene)

@@ -157,7 +157,7 @@ TEST_P(StateOf, IsRefusedByAnother)
 
 INSTANTIATE_TEST_SUITE_P(Variants, StateOf,
                          testing::Values(StateCase{"lpfdm", "lpfdm", {}}, StateCase{"lpfdm_2000", "lpfdm-2000", {}},
-                                         StateCase{"lpfdm_triangles", "lpfdm-2000", {"lpfdm.cells=triangles"}},
+                                         StateCase{"lpfdm_mesh", "lpfdm-2000", {"lpfdm.cells=quadrilaterals"}},
                                          StateCase{"mpm_linear", "mpm-linear", {}}, StateCase{"mpm_bbar", "mpm-linear-bbar", {}},
                                          StateCase{"mpm_bspline", "mpm-bspline", {}}, StateCase{"mpm_cpgimp", "mpm-cpgimp", {}},
                                          StateCase{"mpm_usf", "mpm-linear", {"mpm.scheme=usf"}},

@@ -65,7 +65,7 @@ public:
     }
     std::size_t bytes() const
     {
-        return (partial_.capacity() + volume_.capacity() + strain_.capacity() + mean_.capacity() + weight_.capacity() +
+        return (partial_.capacity() + volume_.capacity() + strain_.capacity() + mean_.capacity() + weight_.capacity() + along_.capacity() +
                 row_volume_.capacity() + row_strain_.capacity()) *
                sizeof(double);
     }

@@ -125,7 +125,7 @@ Diagnosis diagnose(const Scene& scene, const Solver& solver, const RunFacts& fac
     const Traits traits = traits_of(scene);
     const Remedies& remedies = traits.remedies;
     const bool locks = traits.may_lock && nearly_incompressible;
-    if (!lattice)  // the FEM reference
+    if (!lattice)  // the FEM reference, and cells from a file
         return found(facts, "noise") && locks ? Diagnosis{"locking", remedies.locking} : Diagnosis{};
     const bool in_one_cell = traits.reach == 1;
     const auto& bodies = solver.bodies();

@@ -149,7 +149,7 @@ void Observer::write_ledger(const GuardSample& s)
     add(history_, "volume_ratio_max", "-", s.points.largest);
     add(history_, "points_outside", "-", s.points.outside);
     add(history_, "courant_motion", "-", s.point_motion.speed * s.dt / lattice_.cell_size);
-    if (!solver_.nodes().second)
+    if (!solver_.work())
         return;
     add(history_, "external_work", "J/m", s.energy.external);
     add(history_, "plastic_dissipation", "J/m", s.energy.plastic);

@@ -72,7 +72,7 @@ inline void find_points(const Mesh& mesh, const Body& body, std::vector<std::uin
     }
 }
 
-/// Eqs. (7), (8): mass and stress of each cell; its nodes are then those in use.
+/// Eqs. (7), (8): mass and stress of each cell.
 inline void cell_averages(MeshGrid& grid, const std::vector<Body>& bodies, const CellsOfPoints& cells)
 {
     std::fill(grid.mass.begin(), grid.mass.end(), 0.0);
@@ -87,21 +87,23 @@ inline void cell_averages(MeshGrid& grid, const std::vector<Body>& bodies, const
                        for (std::size_t k = 0; k < 3; ++k)
                            grid.stress[k][c] += volume * (q.stress[k][p] + (k < 2 ? body.confinement : 0.0));
                    });
+}
+
+/// The nodes of cells with points are those in use. Returns those that no longer are: they keep their velocity until reach_nodes().
+inline std::vector<std::uint32_t> use_nodes(MeshGrid& grid)
+{
     std::vector<std::uint32_t> used, left;
     for (std::uint32_t n = 0; n < grid.mesh.nodes(); ++n)
         if (const auto around = grid.mesh.around(n);
             std::any_of(around.begin(), around.end(), [&](const Mesh::Around& a) { return grid.mass[a.cell] > 0; }))
             used.push_back(n);
     const auto& before = grid.nodes.active();
-    if (used == before)
-        return;
-    std::set_difference(before.begin(), before.end(), used.begin(), used.end(), std::back_inserter(left));
-    for (const auto n : left)
+    if (used != before)
     {
-        grid.nodes.clear(n);
-        grid.mass_before[n] = 0;
+        std::set_difference(before.begin(), before.end(), used.begin(), used.end(), std::back_inserter(left));
+        grid.nodes.set_active(std::move(used));
     }
-    grid.nodes.set_active(std::move(used));
+    return left;
 }
 
 /// Eqs. (9), (10): an equal part of the mass of the cells around a node, and their forces.
@@ -153,15 +155,13 @@ inline void cell_gradients(MeshGrid& grid, double dt)
 }
 
 /// Nodes that material reaches for the first time take the mean velocity, by mass, of the nodes of the cells around them that had mass
-/// before, or start from zero, as printed.
-inline void reach_nodes(MeshGrid& grid, const Step& step, LpfdmSpec::Frontier kind)
+/// before, or start from zero, as printed. Nodes that it left are then cleared.
+inline void reach_nodes(MeshGrid& grid, const std::vector<std::uint32_t>& left, const Step& step, LpfdmSpec::Frontier kind)
 {
-    if (step.is_first() || kind == LpfdmSpec::Frontier::literal)
-        return;
     std::vector<std::pair<std::uint32_t, Vec<2>>> reached;
     for (const auto n : grid.nodes.active())
     {
-        if (grid.mass_before[n] > 0)
+        if (grid.mass_before[n] > 0 || step.is_first() || kind == LpfdmSpec::Frontier::literal)
             continue;
         std::vector<std::uint32_t> near;
         for (const auto& around : grid.mesh.around(n))
@@ -183,6 +183,11 @@ inline void reach_nodes(MeshGrid& grid, const Step& step, LpfdmSpec::Frontier ki
     }
     for (const auto& [n, v] : reached)
         set(grid.nodes.v, n, v);
+    for (const auto n : left)
+    {
+        grid.nodes.clear(n);
+        grid.mass_before[n] = 0;
+    }
 }
 
 /// Eq. (13) as printed, with the gradient of the cell that holds the departure point x_k - du, none if that is empty. On the side between
@@ -267,7 +272,8 @@ inline void move_points(const MeshGrid& grid, const Lattice<2>& lattice, Body& b
                          for (std::size_t d = 0; d < 2; ++d)
                              q.x[d][p] += dt * v[d];
                      }
-                 });
+                 },
+                 8);
     mark_bins(lattice, body);
 }
 

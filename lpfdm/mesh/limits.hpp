@@ -8,14 +8,21 @@
 
 namespace testbed
 {
+/// Square root of an isotropic law's stiffness, for (xx, yy, engineering shear) [sqrt(Pa)].
+inline Eigen::Matrix3d stiffness_root(const ElasticModuli& law)
+{
+    Eigen::Matrix3d d;
+    d << law.constrained(), law.lame(), 0, law.lame(), law.constrained(), 0, 0, 0, law.shear();
+    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(d).operatorSqrt();
+}
+
 /// Square of the highest frequency of an isolated cell full of unit density, an equal part of its mass at each corner. Its strain is that
 /// of the cell: B of three rows, so that the largest eigenvalue of n A / m B^T D B is that of n D B B^T, 3 x 3. A cell that is partly full
 /// has the same, because its stiffness and its mass shrink together.
-/// @param slopes A grad N of its corners [m] @param area [m^2]
-inline double cell_frequency_squared(std::span<const Vec<2>> slopes, double area, const ElasticModuli& law)
+/// @param slopes A grad N of its corners [m] @param area [m^2] @param root stiffness_root()
+inline double cell_frequency_squared(std::span<const Vec<2>> slopes, double area, const Eigen::Matrix3d& root)
 {
-    Eigen::Matrix3d d, b = Eigen::Matrix3d::Zero();
-    d << law.constrained(), law.lame(), 0, law.lame(), law.constrained(), 0, 0, 0, law.shear();
+    Eigen::Matrix3d b = Eigen::Matrix3d::Zero();
     for (const Vec<2>& slope : slopes)
     {
         const double x = slope[0] / area, y = slope[1] / area;
@@ -23,7 +30,6 @@ inline double cell_frequency_squared(std::span<const Vec<2>> slopes, double area
         rows << x, 0, 0, y, y, x;
         b += rows * rows.transpose();
     }
-    const Eigen::Matrix3d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(d).operatorSqrt();
     const Eigen::Matrix3d similar = root * b * root;
     return static_cast<double>(slopes.size()) *
            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(similar, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
@@ -37,10 +43,10 @@ inline double limit_beside_square(const Mesh& mesh, const std::vector<Body>& bod
     double least = std::numeric_limits<double>::infinity();
     for (const Body& body : bodies)
     {
-        const ElasticModuli& law = moduli(body.material);
-        const double of_square = cell_frequency_squared(square, L * L, law);
+        const Eigen::Matrix3d root = stiffness_root(moduli(body.material));
+        const double of_square = cell_frequency_squared(square, L * L, root);
         for (std::size_t c = 0; c < mesh.cells(); ++c)
-            least = std::min(least, of_square / cell_frequency_squared(mesh.slopes(c), mesh.area(c), law));
+            least = std::min(least, of_square / cell_frequency_squared(mesh.slopes(c), mesh.area(c), root));
     }
     return std::sqrt(least);
 }

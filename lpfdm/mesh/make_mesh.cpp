@@ -8,12 +8,14 @@
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
+#include <set>
 
 namespace testbed
 {
 namespace
 {
 using Cells = LpfdmSpec::Cells;
+constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<Vec<2>> places_of(const Lattice<2>& lattice)
 {
@@ -125,6 +127,51 @@ private:
     toml::table table_;
 };
 
+/// Sides that have a cell on one side only, as their nodes.
+std::vector<std::pair<std::uint32_t, std::uint32_t>> edges_of(const Mesh& mesh)
+{
+    std::set<std::pair<std::uint32_t, std::uint32_t>> sides;
+    for (std::size_t c = 0; c < mesh.cells(); ++c)
+        for (std::size_t k = 0, n = mesh.corners(c).size(); k < n; ++k)
+            sides.emplace(mesh.corners(c)[k], mesh.corners(c)[(k + 1) % n]);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
+    std::copy_if(sides.begin(), sides.end(), std::back_inserter(edges),
+                 [&](const auto& s) {
+                     return !sides.contains({s.second, s.first});
+                 });
+    return edges;
+}
+
+/// Cells that meet have whole sides in common, and none lies over another: no node lies on a side of the mesh's edge, and no place of some
+/// in a cell in another one. @throws std::invalid_argument
+void check_that_cells_fit(const Mesh& mesh, double L)
+{
+    std::set<std::uint32_t> at_edge;
+    const auto edges = edges_of(mesh);
+    for (const auto& [a, b] : edges)
+        at_edge.insert({a, b});
+    for (const auto& [a, b] : edges)
+    {
+        const Vec<2>&from = mesh.place(a), &to = mesh.place(b);
+        const Side side(from, to);
+        const double length = std::hypot(to[0] - from[0], to[1] - from[1]);
+        for (const auto n : at_edge)
+        {
+            const Vec<2>& x = mesh.place(n);
+            const double along = ((x[0] - from[0]) * (to[0] - from[0]) + (x[1] - from[1]) * (to[1] - from[1])) / length;
+            if (n != a && n != b && std::abs(side.distance(x)) < 1e-6 * L && along > -1e-6 * L && along < length + 1e-6 * L)
+                throw std::invalid_argument(fmt::format(
+                    "two cells meet at ({:.6g}, {:.6g}) m without a node in common: cells side by side need the same nodes there "
+                    "(in Gmsh: Coherence, or BooleanFragments)",
+                    x[0], x[1]));
+        }
+    }
+    for (std::size_t c = 0; c < mesh.cells(); ++c)
+        if (const auto other = mesh.over(c))
+            throw std::invalid_argument(fmt::format("cells {} and {} lie over each other near ({:.6g}, {:.6g}) m", c, *other,
+                                                    mesh.places(c)[0][0], mesh.places(c)[0][1]));
+}
+
 NumberedMesh read_mesh(const Scene& scene, const std::string& name)
 {
     const std::string path = (std::filesystem::path(scene.path).parent_path() / name).string();
@@ -132,7 +179,6 @@ NumberedMesh read_mesh(const Scene& scene, const std::string& name)
     const std::vector<Vec<2>> listed = file.nodes();
     MeshCells cells = file.cells();
     const Lattice<2> numbers({0, 0}, scene.grid.cell_size, {static_cast<int>(listed.size()) - 1, 0});
-    constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
     std::vector<Vec<2>> places(numbers.nodes(), {nowhere, nowhere});
     const auto number = [&](std::uint32_t k) { return static_cast<std::uint32_t>(numbers.node({static_cast<int>(k), 0})); };
     for (std::uint32_t k = 0; k < listed.size(); ++k)
@@ -146,7 +192,9 @@ NumberedMesh read_mesh(const Scene& scene, const std::string& name)
         }
     try
     {
-        return {numbers, Mesh(std::move(places), cells, make_lattice(scene.grid))};
+        Mesh mesh(std::move(places), cells, make_lattice(scene.grid));
+        check_that_cells_fit(mesh, scene.grid.cell_size);
+        return {numbers, std::move(mesh)};
     }
     catch (const std::invalid_argument& e)
     {
@@ -169,9 +217,11 @@ NumberedMesh make_mesh(const Scene& scene)
 
 NodeOps node_ops_of(const Scene& scene, const NumberedMesh& mesh)
 {
+    if (scene.options<LpfdmSpec>().cells != Cells::file)
+        return {scene, mesh.numbers};  // what is shaken is not held
     std::vector<Vec<2>> places(mesh.mesh.nodes());
     for (std::size_t n = 0; n < places.size(); ++n)
-        places[n] = mesh.mesh.place(n);
+        places[n] = mesh.mesh.around(n).empty() ? Vec<2>{nowhere, nowhere} : mesh.mesh.place(n);
     return {scene, mesh.numbers, places};
 }
 }  // namespace testbed

@@ -1,5 +1,6 @@
 #include "lpfdm/mesh/mesh.hpp"
 
+#include <bit>
 #include <fmt/format.h>
 #include <limits>
 #include <stdexcept>
@@ -8,7 +9,16 @@ namespace testbed
 {
 namespace
 {
-constexpr double tolerance = 1e-9;  // cells of the lattice
+constexpr double tolerance = 1e-9;        // cells of the lattice
+constexpr std::size_t most_corners = 64;  // weights are products of as many areas
+
+double area_of(std::span<const Vec<2>> x)
+{
+    double twice = 0;
+    for (std::size_t k = 2; k < x.size(); ++k)
+        twice += twice_area(x[0], x[k - 1], x[k]);
+    return 0.5 * twice;
+}
 
 void check(std::size_t cell, std::span<const Vec<2>> x)
 {
@@ -20,14 +30,14 @@ void check(std::size_t cell, std::span<const Vec<2>> x)
         const Vec<2>&a = x[k], &b = x[(k + 1) % n], &c = x[(k + 2) % n];
         turns += std::atan2(twice_area(a, b, c), (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]));
     }
-    bool is_right = n >= 3 && turns < 7;
+    bool is_right = n >= 3 && n <= most_corners && turns < 7 && std::isfinite(area_of(x));
     for (std::size_t k = 0; k < n; ++k)
         is_right = is_right && is_left(k);
     if (!is_right)
-        throw std::invalid_argument(fmt::format(
-            "cell {} with its first corner at ({:.6g}, {:.6g}) m: three or more corners are asked that run anticlockwise around a "
-            "convex cell, none of them on the line between its neighbours",
-            cell, n ? x[0][0] : 0.0, n ? x[0][1] : 0.0));
+        throw std::invalid_argument(
+            fmt::format("cell {} with its first corner at ({:.6g}, {:.6g}) m: 3 to {} corners are asked that run anticlockwise around a "
+                        "convex cell, none of them on the line between its neighbours",
+                        cell, n ? x[0][0] : 0.0, n ? x[0][1] : 0.0, most_corners));
 }
 
 /// No two cells run along a side in the same direction: they would lie over each other.
@@ -43,14 +53,6 @@ void check_sides(const MeshCells& cells)
     if (twice != sides.end())
         throw std::invalid_argument(fmt::format("cells {} and {} lie over each other: both are to the left of their side from node to node",
                                                 (*twice)[2], (*(twice + 1))[2]));
-}
-
-double area_of(std::span<const Vec<2>> x)
-{
-    double twice = 0;
-    for (std::size_t k = 2; k < x.size(); ++k)
-        twice += twice_area(x[0], x[k - 1], x[k]);
-    return 0.5 * twice;
 }
 
 }  // namespace
@@ -91,9 +93,10 @@ Mesh::Mesh(std::vector<Vec<2>> nodes, const MeshCells& cells, const Lattice<2>& 
         for (std::size_t d = 0; d < 2; ++d)
         {
             const auto [least, most] = std::minmax_element(x.begin(), x.end(), [&](const auto& a, const auto& b) { return a[d] < b[d]; });
-            const auto square = [&](double at) { return std::floor((at - lattice.origin[d]) / lattice.cell_size); };
-            low[d] = static_cast<int>(std::max(0.0, square((*least)[d] - tolerance * lattice.cell_size)));
-            high[d] = static_cast<int>(std::min(lattice.size[d] - 1.0, square((*most)[d] + tolerance * lattice.cell_size))) + 1;
+            const auto square = [&](double at)  // within the lattice and a ring around it, before it is an int
+            { return static_cast<int>(std::clamp(std::floor((at - lattice.origin[d]) / lattice.cell_size), -1.0, 1.0 * lattice.size[d])); };
+            low[d] = std::max(0, square((*least)[d] - tolerance * lattice.cell_size));
+            high[d] = std::min(lattice.size[d] - 1, square((*most)[d] + tolerance * lattice.cell_size)) + 1;
         }
         for_each_index(low, high, [&](const Index<2>& at) { in_square[static_cast<std::size_t>(at[1] * columns + at[0])].push_back(c); });
     }
@@ -130,6 +133,49 @@ bool Mesh::is_in_first_half(std::size_t cell, const Vec<2>& place) const
     const auto k = static_cast<std::size_t>(nearest - sides.begin());
     const auto square = [&](const Vec<2>& end) { return std::pow(place[0] - end[0], 2) + std::pow(place[1] - end[1], 2); };
     return square(x[k]) < square(x[(k + 1) % x.size()]);
+}
+
+std::optional<std::uint32_t> Mesh::over(std::size_t cell) const
+{
+    Vec<2> middle{0, 0};
+    for (const Vec<2>& x : places(cell))
+        for (std::size_t d = 0; d < 2; ++d)
+            middle[d] += x[d] / static_cast<double>(places(cell).size());
+    for (const Vec<2>& corner : places(cell))
+        if (const auto other = another_at({0.5 * (middle[0] + corner[0]), 0.5 * (middle[1] + corner[1])}, cell))
+            return other;
+    return another_at(middle, cell);
+}
+
+std::optional<std::uint32_t> Mesh::another_at(const Vec<2>& x, std::size_t cell) const
+{
+    Index<2> at;
+    for (std::size_t d = 0; d < 2; ++d)
+    {
+        const double square = std::floor((x[d] - lattice_.origin[d]) / lattice_.cell_size);
+        if (!(square >= 0 && square < lattice_.size[d]))
+            return std::nullopt;
+        at[d] = static_cast<int>(square);
+    }
+    for (const auto other : in_square_[static_cast<std::size_t>(at[1] * lattice_.size[0] + at[0])])
+        if (other != cell && std::all_of(sides_[other].begin(), sides_[other].end(),
+                                         [&](const Side& side) { return side.distance(x) > tolerance * lattice_.cell_size; }))
+            return other;
+    return std::nullopt;
+}
+
+std::uint32_t Mesh::checksum() const
+{
+    std::uint64_t sum = 0xcbf29ce484222325;  // FNV-1a, of whole numbers
+    const auto add = [&](std::uint64_t number) { sum = (sum ^ number) * 0x100000001b3; };
+    for (std::size_t c = 0; c < cells(); ++c)
+    {
+        add(corners(c).size());
+        for (const Vec<2>& x : places(c))
+            for (const double number : x)
+                add(std::bit_cast<std::uint64_t>(number));
+    }
+    return static_cast<std::uint32_t>(sum ^ sum >> 32);
 }
 
 std::size_t Mesh::bytes() const

@@ -34,7 +34,9 @@ public:
         {
             throw SceneError(fmt::format("{}: at the start {}; the mesh must cover the bodies and where they go", scene.path, e.what()));
         }
+        check_size_of_points(scene);
         cell_averages(grid_, bodies_, cells_);
+        use_nodes(grid_);
         set_initial_velocity(scene);
     }
 
@@ -42,12 +44,18 @@ public:
     {
         node_ops_.begin_step(step);
         timer_("bins", [&] { find_cells(); });
-        timer_("cell averages (7)(8)", [&] { cell_averages(grid_, bodies_, cells_); });
+        std::vector<std::uint32_t> left;
+        timer_("cell averages (7)(8)",
+               [&]
+               {
+                   cell_averages(grid_, bodies_, cells_);
+                   left = use_nodes(grid_);
+               });
         timer_("nodal forces (9)(10)", [&] { nodal_forces(grid_); });
         timer_("convection (13)",
                [&]
                {
-                   reach_nodes(grid_, step, options_.frontier);
+                   reach_nodes(grid_, left, step, options_.frontier);
                    if (options_.convection == LpfdmSpec::Convection::upwind && !step.is_first())
                    {
                        cell_gradients(grid_, step.last_dt);
@@ -85,6 +93,13 @@ public:
             return Vec<2>{x[0] - lattice_.origin[0], x[1] - lattice_.origin[1]};
         };
         return nodal_sums(place, grid_.nodes, lag(), internal_);
+    }
+    /// Where they have a lattice.
+    std::pair<const Lattice<2>*, const Nodes<2>*> nodes() const override
+    {
+        if (options_.cells == LpfdmSpec::Cells::file)
+            return {nullptr, nullptr};
+        return {&numbers_, &grid_.nodes};
     }
     std::optional<NodalWork> work() const override { return node_ops_.work(grid_.nodes, lag()); }
 
@@ -136,28 +151,51 @@ private:
     template <class Archive>
     void state(Archive& a)
     {
+        std::uint32_t checksum = grid_.mesh.checksum();
+        a.value("mesh_checksum", "-", checksum);
+        if (checksum != grid_.mesh.checksum())
+            throw SceneError("the mesh is another one than that of the restart file: lpfdm.mesh must not change on the way");
         state_of_points(a, numbers_);
         if constexpr (Archive::reads)
+        {
             grid_.nodes.clear();
+            std::fill(grid_.mass_before.begin(), grid_.mass_before.end(), 0.0);
+        }
+        std::vector<Index<2>> at;
+        for (const auto n : grid_.nodes.active())
+            at.push_back(numbers_.node_index(n));
         a.group("node",
                 [&]
                 {
+                    a.indices(at);
                     for (std::size_t d = 0; d < 2; ++d)
-                        a.column(Components<2>::velocity[d], "m/s", grid_.nodes.v[d]);
-                    a.column("mass_before", "kg/m", grid_.mass_before);
+                        a.nodal(Components<2>::velocity[d], "m/s", numbers_, at, grid_.nodes.v[d]);
+                    a.nodal("mass_before", "kg/m", numbers_, at, grid_.mass_before);
                 });
         if constexpr (Archive::reads)
-            use_as_read();
+            use_as_read(at);
     }
 
-    /// The nodes that were in use have mass; those that then are no longer are cleared.
-    void use_as_read()
+    /// Those that then are no longer in use are cleared by the next step.
+    void use_as_read(const std::vector<Index<2>>& at)
     {
         std::vector<std::uint32_t> used;
-        for (std::uint32_t n = 0; n < grid_.mesh.nodes(); ++n)
-            if (grid_.mass_before[n] > 0)
-                used.push_back(n);
+        for (const Index<2>& n : at)
+            used.push_back(static_cast<std::uint32_t>(numbers_.node(n)));
         grid_.nodes.set_active(std::move(used));
+    }
+
+    /// @throws SceneError where a point is far larger than the cell that holds it: the cells around it would be empty
+    void check_size_of_points(const Scene& scene) const
+    {
+        constexpr double most = 2.5;  // areas of its cell; one point for two triangles of a square makes two
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            for (const auto c : cells_[b])
+                if (const double volume = bodies_[b].points.initial_volume; volume > most * grid_.mesh.area(c))
+                    throw SceneError(fmt::format(
+                        "{}: body '{}': a point stands for {:.3g} m^2, and lies in a cell of {:.3g} m^2 at ({:.4g}, {:.4g}) m: the mesh is "
+                        "finer than the points, ask for more points_per_cell or a smaller grid.cell_size",
+                        scene.path, bodies_[b].name, volume, grid_.mesh.area(c), grid_.mesh.places(c)[0][0], grid_.mesh.places(c)[0][1]));
     }
 
     /// Every point finds its cell. @throws Diverged when one has left the mesh

@@ -34,6 +34,8 @@ def test_quadrilaterals_of_gmsh(tmp_path, capsys):
     (HEAD + NODES.format(z=0.5) + CELLS, "not plane: z goes from 0 to 0.5"),
     (HEAD + NODES.format(z=0) + "$Elements\n1\n1 1 2 0 1 2 3\n$EndElements\n", "no triangles or quadrilaterals"),
     (HEAD + NODES.format(z=0) + "$Elements\n1\n1 9 2 0 1 2 3 4 5 6 7\n$EndElements\n", "curved sides"),
+    (HEAD + NODES.format(z=0).replace("6 2 4", "6 nan 4") + CELLS, "not finite"),
+    (HEAD + NODES.format(z=0) + "$Elements\n1\n1 3 2 0 1 2 4 3 5\n$EndElements\n", "not convex"),
     (HEAD + NODES.format(z=0) + "$Elements\n1\n1 4 2 0 1 2 3 4 5\n$EndElements\n", "kind tetra are not plane"),
 ])
 def test_refused(tmp_path, capsys, text, message):

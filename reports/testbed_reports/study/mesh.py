@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-KINDS = ("triangle", "quad", "polygon")  # straight sides; polygon is followed by its number of corners
+KINDS = ("triangle", "quad", "polygon")  # of straight sides
 
 
 class MeshError(Exception):
@@ -29,7 +29,7 @@ def read(path):
         raise MeshError(f"{path}: not a mesh that can be read ({type(error).__name__}: {error})") from error
     cells, left_out = [], set()
     for block in mesh.cells:
-        if block.type in KINDS or block.type.startswith("polygon"):
+        if block.type in KINDS:
             cells += [list(map(int, corners)) for corners in block.data]
         elif block.type.rstrip("0123456789") in KINDS:
             raise MeshError(f"{path}: cells of kind {block.type} have curved sides; ask for a mesh of order 1")
@@ -44,18 +44,26 @@ def read(path):
         used = points[sorted({n for cell in cells for n in cell}), 2]
         if np.ptp(used) > 1e-9 * np.ptp(points[:, :2], axis=0).max():
             raise MeshError(f"{path}: the mesh is not plane: z goes from {used.min():g} to {used.max():g}")
+    if not np.isfinite(points[sorted({n for cell in cells for n in cell}), :2]).all():
+        raise MeshError(f"{path}: a node is not finite")
     return points[:, :2], cells, sorted(left_out)
 
 
 def tidy(nodes, cells):
-    """Cells that run anticlockwise, over nodes that some cell has, numbered anew in their order."""
+    """Cells that run anticlockwise, over nodes that some cell has, numbered anew in their order. Raises MeshError."""
     def twice_area(cell):
         x, y = nodes[cell].T
         return np.dot(x, np.roll(y, -1)) - np.dot(np.roll(x, -1), y)
 
+    cells = [cell if twice_area(cell) > 0 else cell[::-1] for cell in cells]
+    for cell in cells:
+        x = nodes[cell]
+        along, on = np.roll(x, -1, axis=0) - x, np.roll(x, -2, axis=0) - np.roll(x, -1, axis=0)
+        if (along[:, 0] * on[:, 1] - along[:, 1] * on[:, 0] <= 0).any():
+            raise MeshError(f"a cell with its first corner at ({x[0, 0]:g}, {x[0, 1]:g}) m is not convex, or has three corners in a line")
     used = sorted({n for cell in cells for n in cell})
     number = {n: k for k, n in enumerate(used)}
-    return nodes[used], [[number[n] for n in (cell if twice_area(cell) > 0 else cell[::-1])] for cell in cells]
+    return nodes[used], [[number[n] for n in cell] for cell in cells]
 
 
 def write(path, nodes, cells, source):
