@@ -124,6 +124,15 @@ TEST(Method, UslAloneDividesBySlivers)
         EXPECT_FALSE(traits_of(test::load(minimal, variant, {})).divides_by_slivers) << variant;
 }
 
+/// A strain at each point locks, one dilatation in each cell does not, nor does a strain of the cell.
+TEST(Method, WhatMayLock)
+{
+    for (const std::string& variant : {"mpm-linear", "mpm-bspline", "mpm-cpgimp"})
+        EXPECT_TRUE(traits_of(test::load(minimal, variant, {})).may_lock) << variant;
+    for (const std::string& variant : {"mpm-linear-bbar", "lpfdm", "lpfdm-2000"})
+        EXPECT_FALSE(traits_of(test::load(minimal, variant, {})).may_lock) << variant;
+}
+
 /// What helps is a setting that the scene takes, whatever its other options.
 TEST(Method, RemediesAreAccepted)
 {
