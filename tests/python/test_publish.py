@@ -8,12 +8,15 @@ import sys
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 from conftest import REPORTS
 from synthetic import write_result, write_study
 from testbed_reports.draw.table import escape
+from testbed_reports.grade import metrics
 from testbed_reports.page.report import build, main
 from testbed_reports.page.study_section import core_hours
+from testbed_reports.read.results import Result
 from testbed_reports.study.outside import main as bring
 
 TESTBED = os.environ.get("TESTBED", "")
@@ -195,3 +198,36 @@ def test_core_hours():
         result = None
 
     assert core_hours([Run(2, solve_s=1800.0, setup_s=300.0), Run(1, solve_s=1800.0, output_s=1800.0), Lost]) == pytest.approx(2 * 2100 / 3600 + 1)
+
+
+def _cb_geo(path, order, position, stress, volume):
+    """Points as CB-Geo writes them: a table, in any order."""
+    names = ["mass", "volume", "coord_x", "coord_y", "coord_z", "velocity_x", "velocity_y", "velocity_z", "stress_xx", "stress_yy", "stress_zz", "tau_xy", "tau_yz", "tau_xz"]
+    table = np.zeros(len(order), dtype=[("id", "u8"), *((name, "f8") for name in names)])
+    table["id"], table["mass"], table["volume"] = order, 2.0, volume[order]
+    table["coord_x"], table["coord_y"] = position[order, 0], position[order, 1]
+    for column, name in enumerate(("stress_xx", "tau_xy", "tau_xz", "stress_yy", "tau_yz", "stress_zz")):
+        table[name] = stress[order, column]
+    with h5py.File(path, "w") as file:
+        file["table"] = table
+
+
+def test_result_of_cb_geo(tmp_path, capsys):
+    """Converted, points in another order, it is graded as the run that its numbers are from; points elsewhere are refused."""
+    run = write_result(tmp_path / "r.h5", stress_error=0.02, displacement_error=0.01)
+    with h5py.File(run) as file:
+        last = file["snapshots"][max(file["snapshots"])]
+        X, x, stress, V = (last[name][()] if name in last else file["snapshots/0000"][name][()] for name in ("initial_position", "position", "stress", "initial_volume"))
+    shuffled = np.random.default_rng(1).permutation(len(X))
+    _cb_geo(tmp_path / "first.h5", np.arange(len(X)), X, 0 * stress, V)
+    _cb_geo(tmp_path / "last.h5", shuffled, x, stress, V)
+    command = [sys.executable, ROOT / "docs" / "examples" / "cb_geo_result.py", "r.h5", "first.h5", "last.h5", "mine.h5", "--seconds", "3"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    assert bring([str(tmp_path / "mine.h5")]) == 0
+    assert "cb-geo on column, completed" in capsys.readouterr().out
+    own, other = metrics.grade(Result(tmp_path / "mine.h5")).rows, metrics.grade(Result(run)).rows
+    for key in (("stress", "l2"), ("stress", "linf"), ("displacement", "l2")):
+        assert own[key] == pytest.approx(other[key], rel=1e-12) and own[key] > 0.009
+    _cb_geo(tmp_path / "first.h5", np.arange(len(X)), X + 0.01, 0 * stress, V)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1 and "same sampling" in done.stderr
