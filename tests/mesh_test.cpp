@@ -232,6 +232,7 @@ TEST(Mesh, ShakesWhatIsFree)
         const bool is_held = x[1] <= 0.5 || x[0] <= 0 || x[0] >= 4 || x[1] >= 4 || (x[0] >= 2.5 && x[0] <= 3 && x[1] <= 2);
         EXPECT_EQ(way > 0, !is_held) << x[0] << ", " << x[1];
         moved += way > 0 && now != other.mesh.place(n);
+        EXPECT_TRUE(is_held || now[0] - x[0] != now[1] - x[1]);
     }
     EXPECT_LE(most, 0.2 * 0.5);
     EXPECT_GT(most, 0.17 * 0.5);
@@ -573,6 +574,37 @@ TEST(MeshLpfdm, NodesReachedAsOthersAreLeft)
         return after(scene_of({std::string("lpfdm.cells=") + cells, "lpfdm.convection=none"}, lone), 300, 2e-3);
     };
     expect_near(of("lattice"), of("quadrilaterals"), 1e-12, "lone point");
+}
+
+/// Nodes that two bodies share start with the mean of their velocities by mass, as on the lattice.
+TEST(MeshLpfdm, StartsAsTheLattice)
+{
+    const auto momentum = [](const char* cells)
+    {
+        const auto solver = test::make(scene_of({std::string("lpfdm.cells=") + cells}, test::two_bodies()));
+        solver->prepare(0, 1e-3);
+        return solver->sums().momentum;
+    };
+    for (std::size_t d = 0; d < 2; ++d)
+        EXPECT_NEAR(momentum("lattice")[d], momentum("quadrilaterals")[d], 1e-9);
+}
+
+/// A block that flies is read into another solver after each of its steps, also where the next one reaches nodes.
+TEST(MeshLpfdm, GoesOnFromEachStep)
+{
+    const Scene scene = scene_of({"lpfdm.cells=triangles"}, block + "velocity = [\"1.7 + 0.2*Y\", \"1.1 - 0.3*X\"]\n");
+    const auto solver = test::make(scene), other = test::make(scene);
+    for (int n = 0; n < 130; ++n)
+    {
+        solver->prepare(n * 4e-3, 4e-3);
+        solver->advance(4e-3);
+        const State state = state_of(*solver);
+        restore(*other, state);
+        solver->prepare((n + 1) * 4e-3, 4e-3);
+        other->prepare((n + 1) * 4e-3, 4e-3);
+        ASSERT_EQ(solver->sums().momentum, other->sums().momentum) << n;
+        restore(*solver, state);
+    }
 }
 
 /// The energy ledger of a mesh is kept and written as that of the lattice; the mesh of a restart must be the same one.
