@@ -22,7 +22,8 @@ NonlocalStrain::NonlocalStrain(const Scene& scene, double cell_size)
         if (material.softening && material.softening->nonlocal)
             spec = &*material.softening->nonlocal;
     reach_ = static_cast<int>(std::ceil(3 * spec->internal_length / cell_size));  // the weight falls to 1e-4
-    if (spec->weight == NonlocalSpec::Weight::gauss)                              // exp(-x^2/l^2) exp(-y^2/l^2)
+    // a Gaussian is exp(-x^2/l^2) exp(-y^2/l^2)
+    if (spec->weight == NonlocalSpec::Weight::gauss)
         for (int i = -reach_; i <= reach_; ++i)
             along_.push_back(nonlocal_weight(*spec, cell_size * std::abs(i)));
     else

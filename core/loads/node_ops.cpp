@@ -21,8 +21,7 @@ Restraint make_boundary(const BoundarySpec& spec, const Scene& scene, const Latt
                                restraint.components[d].nodes.push_back(n);
                    });
     if (std::all_of(restraint.components.begin(), restraint.components.end(), [](const auto& component) { return component.empty(); }))
-        throw SceneError(
-            fmt::format("{}: boundary '{}': where = \"{}\" holds at no node", scene.path, spec.name, spec.where));
+        throw SceneError(fmt::format("{}: boundary '{}': where = \"{}\" holds at no node", scene.path, spec.name, spec.where));
     return restraint;
 }
 

@@ -70,11 +70,8 @@ Mesh::Mesh(std::vector<Vec<2>> nodes, const MeshCells& cells, const Lattice<2>& 
         std::vector<Vec<2>> x;
         for (std::uint32_t k = 0; k < cells[c].size(); ++k)
         {
-            const std::uint32_t n = cells[c][k];
-            if (n >= place_.size())
-                throw std::invalid_argument(fmt::format("cell {}: there is no node {}; the last one is {}", c, n, place_.size() - 1.0));
-            x.push_back(place_[n]);
-            around[n].push_back({c, k});
+            x.push_back(place_[cells[c][k]]);
+            around[cells[c][k]].push_back({c, k});
         }
         check(c, x);
         corners_.append(cells[c]);
@@ -107,11 +104,35 @@ Mesh::Mesh(std::vector<Vec<2>> nodes, const MeshCells& cells, const Lattice<2>& 
         in_square_.append(list);
 }
 
+std::span<const std::uint32_t> Mesh::in_square(const Index<2>& at) const
+{
+    return in_square_[static_cast<std::size_t>(at[1] * lattice_.size[0] + at[0])];
+}
+
+std::optional<Index<2>> Mesh::square_of(const Vec<2>& place) const
+{
+    Index<2> at;
+    for (std::size_t d = 0; d < 2; ++d)
+    {
+        const double square = std::floor((place[d] - lattice_.origin[d]) / lattice_.cell_size);
+        if (!(square >= 0 && square < lattice_.size[d]))  // NaN, too
+            return std::nullopt;
+        at[d] = static_cast<int>(square);
+    }
+    return at;
+}
+
+std::optional<std::uint32_t> Mesh::find(const Vec<2>& place) const
+{
+    const auto at = square_of(place);
+    return at ? find(*at, place) : std::nullopt;
+}
+
 std::optional<std::uint32_t> Mesh::find(const Index<2>& at, const Vec<2>& place) const
 {
     const double near = tolerance * lattice_.cell_size;
     std::optional<std::uint32_t> on_side;
-    for (const auto c : in_square_[static_cast<std::size_t>(at[1] * lattice_.size[0] + at[0])])
+    for (const auto c : in_square(at))
     {
         double distance = std::numeric_limits<double>::infinity();
         for (const Side& side : sides_[c])
@@ -149,15 +170,10 @@ std::optional<std::uint32_t> Mesh::over(std::size_t cell) const
 
 std::optional<std::uint32_t> Mesh::another_at(const Vec<2>& x, std::size_t cell) const
 {
-    Index<2> at;
-    for (std::size_t d = 0; d < 2; ++d)
-    {
-        const double square = std::floor((x[d] - lattice_.origin[d]) / lattice_.cell_size);
-        if (!(square >= 0 && square < lattice_.size[d]))
-            return std::nullopt;
-        at[d] = static_cast<int>(square);
-    }
-    for (const auto other : in_square_[static_cast<std::size_t>(at[1] * lattice_.size[0] + at[0])])
+    const auto at = square_of(x);
+    if (!at)
+        return std::nullopt;
+    for (const auto other : in_square(*at))
         if (other != cell && std::all_of(sides_[other].begin(), sides_[other].end(),
                                          [&](const Side& side) { return side.distance(x) > tolerance * lattice_.cell_size; }))
             return other;

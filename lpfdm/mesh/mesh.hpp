@@ -56,6 +56,8 @@ public:
     /// The cell that holds a place in a cell of the lattice. What lies on a side goes to the cell around which it lies in the first half of
     /// that side, so that rows of points on a diagonal are shared out evenly between its two cells.
     std::optional<std::uint32_t> find(const Index<2>& at, const Vec<2>& place) const;
+    /// The same for a place anywhere: none beyond the lattice.
+    std::optional<std::uint32_t> find(const Vec<2>& place) const;
     /// Another cell that holds one of some places inside this one, if that lies in the lattice.
     std::optional<std::uint32_t> over(std::size_t cell) const;
     /// Of all corners and where they are: another mesh has another one.
@@ -63,6 +65,10 @@ public:
     std::size_t bytes() const;
 
 private:
+    /// Cells that reach into a cell of the lattice.
+    std::span<const std::uint32_t> in_square(const Index<2>& at) const;
+    /// The cell of the lattice that holds a place.
+    std::optional<Index<2>> square_of(const Vec<2>& place) const;
     std::optional<std::uint32_t> another_at(const Vec<2>& place, std::size_t cell) const;
     /// Whether a place within rounding of a side of the cell lies in the first half of that side.
     bool is_in_first_half(std::size_t cell, const Vec<2>& place) const;

@@ -107,16 +107,8 @@ public:
     Vec<2> velocity(std::size_t body, std::size_t p) const override
     {
         const Vec<2> x = at(bodies_[body].points.x, p);
-        Index<2> square;
-        for (std::size_t d = 0; d < 2; ++d)
-        {
-            const double place = (x[d] - lattice_.origin[d]) / lattice_.cell_size;
-            if (!(place >= 0 && place < lattice_.size[d]))
-                return {0, 0};
-            square[d] = static_cast<int>(place);
-        }
         std::vector<double> weights;
-        const auto cell = grid_.mesh.find(square, x);
+        const auto cell = grid_.mesh.find(x);
         return cell ? velocity_at(grid_, *cell, x, weights) : Vec<2>{0, 0};
     }
 
