@@ -135,21 +135,21 @@ const GuardSample& Observer::sample(double t, double dt, bool fresh)
     add(history_, "angular_momentum", "kg m/s", motion.angular_momentum);
     add(history_, "unbalanced_force", "-", motion.unbalanced);
     add(history_, "max_stress", "Pa", state.max_stress);
-    write_ledger(last_);
+    write_ledger(last_, work.has_value());
     sample_restraints();
     if (!probes_.empty())
         sample_probes(t);
     return last_;
 }
 
-void Observer::write_ledger(const GuardSample& s)
+void Observer::write_ledger(const GuardSample& s, bool has_work)
 {
     add(history_, "kinetic_energy_points", "J/m", s.point_motion.kinetic_energy);
     add(history_, "volume_ratio_min", "-", s.points.smallest);
     add(history_, "volume_ratio_max", "-", s.points.largest);
     add(history_, "points_outside", "-", s.points.outside);
     add(history_, "courant_motion", "-", s.point_motion.speed * s.dt / lattice_.cell_size);
-    if (!solver_.work())
+    if (!has_work)
         return;
     add(history_, "external_work", "J/m", s.energy.external);
     add(history_, "plastic_dissipation", "J/m", s.energy.plastic);

@@ -79,7 +79,8 @@ private:
     std::array<double, 3> exact_displacement(const Place& at) const;
     /// The work of gravity on the points up to time t [J/m].
     double gravity_work(double t, const Vec<2>& moment);
-    void write_ledger(const GuardSample& sample);
+    /// @param has_work whether the method knows its work, and with it the energies of the ledger
+    void write_ledger(const GuardSample& sample, bool has_work);
     void sample_probes(double t);
     void sample_restraints();
     /// Adds a row to the series of that name.
