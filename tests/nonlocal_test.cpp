@@ -52,6 +52,30 @@ void check_against_double_sum(const std::string& weight, double tolerance)
         EXPECT_NEAR(q.softening_strain[p], -0.7 * q.plastic_shear[p] + 1.7 * sum / total, tolerance);
     }
 }
+/// The first body of a scene, whose points belong to one cell each.
+struct OnCells
+{
+    const Scene& scene;
+    Lattice<2> lattice;
+    std::vector<Body> bodies;
+
+    explicit OnCells(const Scene& s) : scene(s), lattice(make_lattice(s.grid)), bodies(make_bodies(s, lattice, {}))
+    {
+        std::vector<double> workspace;
+        bodies[0].bins.rebuild<PointSupport>(bodies[0].points, workspace);
+    }
+    /// Sets the softening strain.
+    void average()
+    {
+        const auto index = [&](const Index<2>& at) { return lattice.cell(at); };
+        Gather gather(lattice.cells());
+        const std::vector<const Bins<2>*> bins{&bodies[0].bins};
+        gather.rebuild<1, 2>(bins, index);
+        NonlocalStrain nonlocal(scene, lattice.cell_size);
+        nonlocal.resize(lattice.cell_stride(), lattice.cells());
+        nonlocal.apply<PointSupport>(lattice, bodies, gather, index);
+    }
+};
 }  // namespace
 
 /// Against the double sum over points: the way over cells or nodes costs part of a cell's smoothing.
@@ -75,23 +99,14 @@ TEST(Nonlocal, IsTheDoubleSumOverCells)
         Scene scene = nonlocal_scene(0.15, 1.7, weight);
         scene.bodies[0].points_per_cell = 1;
         scene.bodies[0].min = Vec<2>{0, 0.3};
-        const Lattice<2> lattice = make_lattice(scene.grid);
-        auto bodies = make_bodies(scene, lattice, {});
-        std::vector<double> workspace;
-        bodies[0].bins.rebuild<PointSupport>(bodies[0].points, workspace);
-        const auto index = [&](const Index<2>& at) { return lattice.cell(at); };
-        Gather gather(lattice.cells());
-        const std::vector<const Bins<2>*> bins{&bodies[0].bins};
-        gather.rebuild<1, 2>(bins, index);
-        Points<2>& q = bodies[0].points;
+        OnCells soil(scene);
+        Points<2>& q = soil.bodies[0].points;
         for (std::size_t p = 0; p < q.count; ++p)
         {
             q.plastic_shear[p] = 0.01 * (1 + std::sin(50 * q.x[0][p] + 31 * q.x[1][p]));
             q.volume[p] *= 1 + 0.3 * std::sin(17 * q.x[1][p]);
         }
-        NonlocalStrain nonlocal(scene, lattice.cell_size);
-        nonlocal.resize(lattice.cell_stride(), lattice.cells());
-        nonlocal.apply<PointSupport>(lattice, bodies, gather, index);
+        soil.average();
         const NonlocalSpec& spec = *scene.materials[0].softening->nonlocal;
         for (std::size_t p = 0; p < q.count; ++p)
         {
@@ -114,21 +129,12 @@ TEST(Nonlocal, NeverBelowZeroAndAbsentWhereNotAsked)
 {
     const Scene scene = nonlocal_scene(0.4, 1.7, "gauss");
     EXPECT_TRUE(has_nonlocal_softening(scene));
-    const Lattice<2> lattice = make_lattice(scene.grid);
-    auto bodies = make_bodies(scene, lattice, {});
-    std::vector<double> workspace;
-    bodies[0].bins.rebuild<PointSupport>(bodies[0].points, workspace);
-    const auto index = [&](const Index<2>& at) { return lattice.cell(at); };
-    Gather gather(lattice.cells());
-    const std::vector<const Bins<2>*> bins{&bodies[0].bins};
-    gather.rebuild<1, 2>(bins, index);
-    bodies[0].points.plastic_shear[700] = 0.01;  // one point: its own strain counts -0.7, the mean next to nothing
-    NonlocalStrain nonlocal(scene, lattice.cell_size);
-    nonlocal.resize(lattice.cell_stride(), lattice.cells());
-    nonlocal.apply<PointSupport>(lattice, bodies, gather, index);
-    EXPECT_EQ(bodies[0].points.softening_strain[700], 0);
-    EXPECT_GT(bodies[0].points.softening_strain[704], 0);
-    const Points<2>& q = bodies[0].points;
+    OnCells soil(scene);
+    soil.bodies[0].points.plastic_shear[700] = 0.01;  // one point: its own strain counts -0.7, the mean next to nothing
+    soil.average();
+    EXPECT_EQ(soil.bodies[0].points.softening_strain[700], 0);
+    EXPECT_GT(soil.bodies[0].points.softening_strain[704], 0);
+    const Points<2>& q = soil.bodies[0].points;
     for (std::size_t p = 0; p < q.count; ++p)  // the weight reaches three internal lengths
         if (const double r = std::hypot(q.x[0][p] - q.x[0][700], q.x[1][p] - q.x[1][700]); r > 0.3)
             EXPECT_TRUE(r > 1.1 || q.softening_strain[p] > 0) << r;
