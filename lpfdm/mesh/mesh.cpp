@@ -63,8 +63,8 @@ Mesh::Mesh(std::vector<Vec<2>> nodes, const MeshCells& cells, const Lattice<2>& 
       least_height_(std::numeric_limits<double>::infinity())
 {
     std::vector<std::vector<Around>> around(place_.size());
-    const auto [columns, rows] = static_cast<const std::array<int, 2>&>(lattice.size);
-    std::vector<std::vector<std::uint32_t>> in_square(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+    std::vector<std::vector<std::uint32_t>> in_square(static_cast<std::size_t>(lattice.size[0]) *
+                                                      static_cast<std::size_t>(lattice.size[1]));
     for (std::uint32_t c = 0; c < cells.size(); ++c)
     {
         std::vector<Vec<2>> x;
@@ -95,7 +95,8 @@ Mesh::Mesh(std::vector<Vec<2>> nodes, const MeshCells& cells, const Lattice<2>& 
             low[d] = std::max(0, square((*least)[d] - tolerance * lattice.cell_size));
             high[d] = std::min(lattice.size[d] - 1, square((*most)[d] + tolerance * lattice.cell_size)) + 1;
         }
-        for_each_index(low, high, [&](const Index<2>& at) { in_square[static_cast<std::size_t>(at[1] * columns + at[0])].push_back(c); });
+        for_each_index(low, high,
+                       [&](const Index<2>& at) { in_square[static_cast<std::size_t>(at[1] * lattice.size[0] + at[0])].push_back(c); });
     }
     check_sides(cells);
     for (const auto& list : around)
