@@ -1,5 +1,6 @@
 #include "benchmarks/harness/bench.hpp"
 
+#include "benchmarks/harness/bench_scenes.hpp"
 #include "core/base/provenance.hpp"
 #include "core/run/results.hpp"
 
@@ -59,28 +60,28 @@ double traffic(const Solver& solver)
     return bytes / points;
 }
 
+/// One measurement to be made.
+struct Item
+{
+    std::string method;
+    BenchScene scene;
+    double points;
+    int points_per_cell;
+};
+
 struct Measurement
 {
-    std::string method, law;
+    Item item;
     int team = 1;
     std::size_t points = 0, cells = 0, steps = 0;
     double setup = 0, seconds = 0, fastest = 0;  ///< per step: median and least of ten slices [s]
     double bytes = 0, traffic = 0;               ///< per point
     double triad = 0;                            ///< bandwidth of the same team [B/s]
-    std::vector<std::pair<std::string, double>> phases;
+    std::vector<std::pair<std::string, double>> phases{};
 
     double rate() const { return static_cast<double>(points) / seconds; }
     double share_of_bound() const { return rate() * traffic / triad; }
 };
-
-std::vector<std::string> settings(const std::string& law, double points)
-{
-    if (law == "elastic")
-        return {fmt::format("constants.cells={}", std::max(1L, std::lround(std::sqrt(points) / 4)))};
-    // the section of the cliff is 461 m2; its width of 50 m is a whole number of cells
-    const double L = 50 / std::max(1.0, std::round(50 / std::sqrt(16 * 461 / points) / 5)) / 5;
-    return {fmt::format("grid.cell_size={:.17g}", L), fmt::format("time.dt={:.17g}", 5e-4 * L)};
-}
 
 /// Where the cases are: beside an installed program, else in the sources.
 std::filesystem::path cases()
@@ -89,18 +90,14 @@ std::filesystem::path cases()
     return std::filesystem::exists(installed) ? installed : std::filesystem::path(BENCHMARKS);
 }
 
-Measurement measure(const std::string& method, const std::string& law, double points, int team, double seconds)
+Measurement measure(const Item& item, int team, double seconds)
 {
     set_threads(team);
     const Stopwatch setup;
-    const std::string scene_path = (cases() / (law == "elastic" ? "elastic/speed/scene.toml" : "soil/cliff/scene.toml")).string();
-    const Scene scene = load_scene(scene_path, method, settings(law, points)).scene;
+    const std::string path = (cases() / item.scene.file).string();
+    const Scene scene = load_scene(path, item.method, item.scene.settings(item.points, item.points_per_cell)).scene;
     const std::unique_ptr<Solver> solver = method_of(scene).make(scene);
-    Measurement m;
-    m.method = method;
-    m.law = law;
-    m.team = team;
-    m.setup = setup.seconds();
+    Measurement m{.item = item, .team = team, .setup = setup.seconds()};
     const double dt = time_step(scene, *solver);
     std::size_t step = 0;
     const auto advance = [&](std::size_t steps)
@@ -113,9 +110,14 @@ Measurement measure(const std::string& method, const std::string& law, double po
         }
         return watch.seconds() / static_cast<double>(steps);
     };
+    if (item.scene.begin > 0)
+        advance(static_cast<std::size_t>(item.scene.begin / dt));
     const double once = advance(3);
     const auto before = solver->timer().phases();
-    const std::size_t slice = std::max<std::size_t>(3, static_cast<std::size_t>(seconds / 10 / once));
+    auto slice = static_cast<std::size_t>(seconds / 10 / once);
+    if (item.scene.begin > 0)  // not beyond the run's end
+        slice = std::min(slice, static_cast<std::size_t>((scene.time.end - item.scene.begin) / dt / 10));
+    slice = std::max<std::size_t>(3, slice);
     std::vector<double> slices;
     for (int k = 0; k < 10; ++k)
         slices.push_back(advance(slice));
@@ -139,22 +141,24 @@ Measurement measure(const std::string& method, const std::string& law, double po
 /// What is measured: all that the options leave open.
 struct Plan
 {
-    std::vector<std::string> methods, laws;
+    std::vector<Item> items;
     std::vector<int> teams;
 };
+
+std::vector<std::string> methods_with_points()
+{
+    std::vector<std::string> names;
+    for (const Method& method : methods())
+        for (const Variant& variant : method.variants)
+            if (method.make)
+                names.push_back(variant.name);
+    return names;
+}
 
 /// @throws SceneError
 Plan plan_of(const BenchOptions& options, int cores)
 {
-    Plan plan{options.methods, options.laws, options.threads};
-    if (plan.laws.empty())
-        plan.laws = {"elastic", "mohr_coulomb"};
-    if (plan.methods.empty())
-        for (const Method& method : methods())
-            for (const Variant& variant : method.variants)
-                if (method.make)
-                    plan.methods.push_back(variant.name);
-    for (const std::string& method : plan.methods)
+    for (const std::string& method : options.methods)
         if (!find_method(method).make)
             throw SceneError(fmt::format("bench: '{}' is a program of its own, and has no particles", method));
     for (const double points : options.points)
@@ -162,8 +166,25 @@ Plan plan_of(const BenchOptions& options, int cores)
             throw SceneError(fmt::format("bench: --points from 16 to 1e9, not {}", points));
     if (!(options.seconds > 0 && options.seconds <= 3600))
         throw SceneError(fmt::format("bench: --seconds above 0 and at most 3600, not {}", options.seconds));
-    if (plan.teams.empty())
-        plan.teams = cores > 1 ? std::vector<int>{1, cores} : std::vector<int>{1};
+    const auto or_else = [](const auto& given, const auto& list) { return given.empty() ? list : given; };
+    const auto is_wanted = [](const std::vector<std::string>& list, const char* name)
+    { return list.empty() || std::find(list.begin(), list.end(), name) != list.end(); };
+    Plan plan{{}, or_else(options.threads, cores > 1 ? std::vector<int>{1, cores} : std::vector<int>{1})};
+    for (const BenchScene& scene : bench_scenes())
+    {
+        if (!is_wanted(options.scenes, scene.name) || !is_wanted(options.laws, scene.law))
+            continue;
+        const auto all_points =
+            or_else(options.points, scene.own ? std::vector<double>{scene.own->points} : std::vector<double>{300, 1e4, 1e5, 1e6});
+        const auto all_counts =
+            or_else(options.points_per_cell, scene.own ? std::vector<int>{scene.own->points_per_cell} : std::vector<int>{4, 2});
+        for (const std::string& method : or_else(options.methods, methods_with_points()))
+            for (const double points : all_points)
+                for (const int count : all_counts)
+                    plan.items.push_back({method, scene, points, count});
+    }
+    if (plan.items.empty())
+        throw SceneError("bench: no scene has both this --scene and this --law");
     return plan;
 }
 
@@ -181,14 +202,15 @@ void print_heading(const Machine& machine, const std::vector<int>& teams, const 
     fmt::print("{}, {} cores, commit {}, load {:.2f}\n", cpu_name(), machine.cores, build().commit, machine.load);
     for (std::size_t k = 0; k < teams.size(); ++k)
         fmt::print("triad, {} thread{}: {:.1f} GB/s\n", teams[k], teams[k] > 1 ? "s" : "", 1e-9 * triad[k]);
-    fmt::print("{:<16} {:<13} {:>9} {:>7} {:>11} {:>11} {:>9} {:>9} {:>9}\n", "method", "law", "points", "threads", "Mpoint-st/s",
-               "fastest", "B/point", "of bound", "set-up s");
+    fmt::print("{:<16} {:<10} {:>6} {:>9} {:>7} {:>11} {:>11} {:>9} {:>9} {:>9}\n", "method", "scene", "a cell", "points", "threads",
+               "Mpoint-st/s", "fastest", "B/point", "of bound", "set-up s");
 }
 
 void print_row(const Measurement& m)
 {
-    fmt::print("{:<16} {:<13} {:>9} {:>7} {:>11.1f} {:>11.1f} {:>9.1f} {:>9.2f} {:>9.2f}\n", m.method, m.law, m.points, m.team,
-               1e-6 * m.rate(), 1e-6 * static_cast<double>(m.points) / m.fastest, m.bytes, m.share_of_bound(), m.setup);
+    fmt::print("{:<16} {:<10} {:>6} {:>9} {:>7} {:>11.1f} {:>11.1f} {:>9.1f} {:>9.2f} {:>9.2f}\n", m.item.method, m.item.scene.name,
+               fmt::format("{0} x {0}", m.item.points_per_cell), m.points, m.team, 1e-6 * m.rate(),
+               1e-6 * static_cast<double>(m.points) / m.fastest, m.bytes, m.share_of_bound(), m.setup);
     std::fflush(stdout);
 }
 
@@ -204,7 +226,7 @@ std::ofstream open_csv(const std::string& path, const Machine& machine)
     csv << fmt::format("# {}, {} cores, {}, {}, commit {}, load {:.2f}{}\n", cpu_name(), machine.cores, build().compiler, build().flags,
                        build().commit, machine.load, machine.is_busy() ? ", busy" : "")
         << "method,law,points,cells,threads,steps,seconds_per_step,fastest_seconds_per_step,particle_steps_per_second,bytes_per_point,"
-           "traffic_bytes_per_point,triad_bytes_per_second,share_of_traffic_bound,setup_seconds,phases\n";
+           "traffic_bytes_per_point,triad_bytes_per_second,share_of_traffic_bound,setup_seconds,phases,scene,points_per_cell\n";
     return csv;
 }
 
@@ -213,9 +235,9 @@ std::string csv_row(const Measurement& m)
     std::vector<std::string> phases;
     for (const auto& [name, seconds] : m.phases)
         phases.push_back(fmt::format("{}: {:.4g}", name, seconds));
-    return fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.5g},{:.5g},{:.5g},{:.4g},{:.4g},\"{}\"\n", m.method, m.law, m.points,
-                       m.cells, m.team, m.steps, m.seconds, m.fastest, m.rate(), m.bytes, m.traffic, m.triad, m.share_of_bound(), m.setup,
-                       fmt::join(phases, "; "));
+    return fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.5g},{:.5g},{:.5g},{:.4g},{:.4g},\"{}\",{},{}\n", m.item.method,
+                       m.item.scene.law, m.points, m.cells, m.team, m.steps, m.seconds, m.fastest, m.rate(), m.bytes, m.traffic, m.triad,
+                       m.share_of_bound(), m.setup, fmt::join(phases, "; "), m.item.scene.name, m.item.points_per_cell);
 }
 }  // namespace
 
@@ -231,21 +253,20 @@ void bench(const BenchOptions& options)
         triad.push_back(triad_bandwidth(team));
     print_heading(machine, plan.teams, triad);
     std::ofstream csv = open_csv(options.output, machine);
-    for (const std::string& law : plan.laws)
-        for (const std::string& method : plan.methods)
-            for (const double points : options.points)
-                for (std::size_t k = 0; k < plan.teams.size(); ++k)
-                    try
-                    {
-                        Measurement m = measure(method, law, points, plan.teams[k], options.seconds);
-                        m.triad = triad[k];
-                        print_row(m);
-                        csv << csv_row(m) << std::flush;
-                    }
-                    catch (const Diverged& e)
-                    {
-                        fmt::print("{:<16} {:<13} {:>9.0f} {:>7} diverged: {}\n", method, law, points, plan.teams[k], e.what());
-                    }
+    for (const Item& item : plan.items)
+        for (std::size_t k = 0; k < plan.teams.size(); ++k)
+            try
+            {
+                Measurement m = measure(item, plan.teams[k], options.seconds);
+                m.triad = triad[k];
+                print_row(m);
+                csv << csv_row(m) << std::flush;
+            }
+            catch (const Diverged& e)
+            {
+                fmt::print("{:<16} {:<10} {:>6} {:>9.0f} {:>7} diverged: {}\n", item.method, item.scene.name, item.points_per_cell,
+                           item.points, plan.teams[k], e.what());
+            }
     if (!options.output.empty() && !csv)
         throw OutputError(fmt::format("writing '{}' failed (disk full?)", options.output));
 }

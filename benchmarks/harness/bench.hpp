@@ -7,11 +7,12 @@ namespace testbed
 {
 struct BenchOptions
 {
-    std::vector<std::string> methods, laws;  ///< all when empty
-    std::vector<double> points{1e4, 1e5, 1e6, 4e6};
-    std::vector<int> threads;  ///< 1 and all when empty
-    double seconds = 1;        ///< of each measurement, about
-    std::string output;        ///< CSV file; none when empty
+    std::vector<std::string> methods, scenes, laws;  ///< all when empty
+    std::vector<double> points;                      ///< 300 to 1e6 when empty, or as the scene's study has it
+    std::vector<int> points_per_cell;                ///< in each direction; 4 and 2 when empty, or as the scene's study has it
+    std::vector<int> threads;                        ///< 1 and all when empty
+    double seconds = 1;                              ///< of each measurement, about
+    std::string output;                              ///< CSV file; none when empty
 };
 
 /// Prints a table and writes the CSV file as it goes, a row per measurement; a run that diverges is told. @throws SceneError, OutputError

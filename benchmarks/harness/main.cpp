@@ -1,4 +1,5 @@
 #include "benchmarks/harness/bench.hpp"
+#include "benchmarks/harness/bench_scenes.hpp"
 #include "benchmarks/harness/modes.hpp"
 #include "core/base/provenance.hpp"
 #include "core/run/observer.hpp"
@@ -159,8 +160,12 @@ std::vector<std::string> rest_of(int argc, char** argv, int from)
 void add_bench_options(CLI::App& command, BenchOptions& options)
 {
     command.add_option("--method", options.methods, "only these methods");
-    command.add_option("--law", options.laws, "elastic, mohr_coulomb")->check(CLI::IsMember({"elastic", "mohr_coulomb"}));
-    command.add_option("--points", options.points, "numbers of points, about, 16 to 1e9");
+    command.add_option("--scene", options.scenes, "only these scenes")->check(CLI::IsMember(bench_scene_names()));
+    command.add_option("--law", options.laws, "only scenes with these laws")->check(CLI::IsMember({"elastic", "mohr_coulomb"}));
+    command.add_option("--points", options.points,
+                       "numbers of points, about, 16 to 1e9 (default: 300, 1e4, 1e5, 1e6; flows: as their study has it)");
+    command.add_option("--points-per-cell", options.points_per_cell, "in each direction (default: 4 and 2; flows: as their study has it)")
+        ->check(CLI::Range(1, 16));
     command.add_option("--threads", options.threads, "default: 1 and all")->check(CLI::Range(1, 1024));
     command.add_option("--seconds", options.seconds, "of each measurement, at most 3600");
     command.add_option("-o,--output", options.output,
