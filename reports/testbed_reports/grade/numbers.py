@@ -6,15 +6,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..read.results import FINISHED
-from ..read.study_file import same
 from .convergence import fit_order
+from .partners import NO_SETTING, ratio
 from .targets import mean_by_size, number, values_by_size
 
 
 @dataclass
 class Number:
     """`text` as it is read; `values`: the number, or both ends of a range. `take` says what was made of the metric (`quantity`, `norm`) of
-    `runs`, and of `over` where it is a ratio; then times `scale`, plus `offset`. `missing`: why it is none, or not all of it."""
+    the `runs` that gave it, and of `over` where it is a ratio; then times `scale`, plus `offset`. `missing`: why it is none, or not all of it."""
     text: str
     values: tuple
     study: str
@@ -35,7 +35,6 @@ class Number:
 
 
 TAKEN = {"mean": statistics.fmean, "median": statistics.median, "min": min, "max": max}
-NO_SETTING = ("repeat", "dt", "seed")
 
 
 def value_of(run, quantity, norm):
@@ -56,22 +55,6 @@ def taken(take, runs, quantity, norm):
     return ([order] if math.isfinite(order) else []), lost
 
 
-def ratios(take, runs, below, quantity, norm, changed):
-    """The same over that of the runs `below`; of each run over the mean of those that share its setting, as far as these have several
-    beside the keys that are `changed`."""
-    if take != "every":
-        (top, lost), (base, lost_below) = taken(take, runs, quantity, norm), taken(take, below, quantity, norm)
-        return [v / base[0] for v in top] if base and base[0] else [], lost + lost_below
-    keys = [k for k in dict.fromkeys(k for run in below for k in run.values) if k not in (*NO_SETTING, *changed, "variant", "method", "ppc") and len({str(run.values.get(k)) for run in below}) > 1]
-    found, lost = [], [run for run in runs + below if not math.isfinite(value_of(run, quantity, norm))]
-    for run in runs:
-        pair = [value_of(b, quantity, norm) for b in below if all(same(b.values.get(k), run.values.get(k)) for k in keys)]
-        pair = [v for v in pair if math.isfinite(v)]
-        if math.isfinite(value_of(run, quantity, norm)) and pair and statistics.fmean(pair):
-            found.append(value_of(run, quantity, norm) / statistics.fmean(pair))
-    return found, list({id(run): run for run in lost}.values())
-
-
 def _text(values, digits):
     low, high = (number(v, digits) for v in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
@@ -90,13 +73,18 @@ def mean_of_seeds(pairs, digits):
     return f"{number(statistics.fmean(means), digits)} ± {number(statistics.stdev(means), 2)} ({of} seeds)"
 
 
-def _of_seeds(runs, values, digits):
+def _of_seeds(runs, quantity, norm, entry):
     """'mean ± standard deviation (n seeds)' of runs that differ by their seeds alone; '' for others."""
     settings = {tuple((k, str(v)) for k, v in run.values.items() if k not in NO_SETTING and not k.endswith(".seed")) for run in runs}
     seeds = {str(run.values.get("seed", "")) for run in runs}
     if len(settings) > 1 or len(seeds) < 2:
         return ""
-    return mean_of_seeds([(run.values.get("seed", ""), value) for run, value in zip(runs, values)], digits)
+    return mean_of_seeds([(run.values.get("seed", ""), value_of(run, quantity, norm) * entry["scale"] + entry["offset"]) for run in runs], entry["digits"])
+
+
+def told(runs, words):
+    """The first of some runs by name, each with words(run)."""
+    return ", ".join(f"{run.id} {words(run)}".rstrip() for run in runs[:3]) + (f" and {len(runs) - 3} more" if len(runs) > 3 else "")
 
 
 def number_of(study, entry):
@@ -104,21 +92,27 @@ def number_of(study, entry):
     quantity, norm, take, scale, offset = (entry[k] for k in ("quantity", "norm", "take", "scale", "offset"))
     below_where = {**entry["where"], **entry.get("over", {})}
     runs, below = study.select(entry["where"]), study.select(below_where) if "over" in entry else []
-    found = Number("?", (), study.name, quantity, norm, "each over its partner" if take == "every" and "over" in entry else take, [r.id for r in runs], [r.id for r in below], scale, offset,
-                   suspect=sum(run.suspect for run in runs + below))
+    found = Number("?", (), study.name, quantity, norm, "each over its partner" if take == "every" and "over" in entry else take, [r.id for r in runs], [r.id for r in below], scale, offset)
     what = f"{quantity} {norm}".rstrip()
     for chosen, where in ((runs, entry["where"]), *([(below, below_where)] if "over" in entry else [])):
         if not chosen:
             return replace(found, left_out=bool(study.left_out_of(where)), missing=f"no run to take {what} from: 'where' chooses none")
-    values, lost = ratios(take, runs, below, quantity, norm, entry["over"]) if "over" in entry else taken(take, runs, quantity, norm)
-    failed = [run for run in lost if run.status in FINISHED and not run.completed]
-    told = ", ".join(f"{run.id} {run.label if not run.completed else 'has none'}" for run in lost[:3]) + (f" and {len(lost) - 3} more" if len(lost) > 3 else "")
+    if "over" in entry:
+        made = ratio(take, runs, below, lambda run: value_of(run, quantity, norm), lambda side: taken(take, side, quantity, norm)[0], entry["over"])
+        values, lost, alone, zero, runs, below = made.values, made.lost, made.alone, made.zero, made.runs, made.below
+    else:
+        (values, lost), alone, zero = taken(take, runs, quantity, norm), [], []
+        runs = [run for run in runs if not any(run is other for other in lost)]
+    missing = [f"no {what} of {told(lost, lambda run: run.label if not run.completed else 'has none')}"] if lost else []
+    missing += [f"no partner at the settings of {told(alone, lambda run: '')}"] if alone else []
+    missing += [f"nothing to divide {told(zero, lambda run: '')} by: zero"] if zero else []
+    failed = len(lost) > 0 and not alone and all(run.status in FINISHED and not run.completed for run in lost)
     if not values:
-        return replace(found, failed=bool(failed) and len(failed) == len(lost), missing=f"no {what}" + (f": {told}" if told else ""))
+        return replace(found, failed=failed, missing="; ".join(missing) or f"no {what}")
     values = [v * scale + offset for v in values]
-    text = _of_seeds(runs, [value_of(run, quantity, norm) * scale + offset for run in runs], entry["digits"]) if take == "every" and "over" not in entry else ""
-    return replace(found, text=text or _text(values, entry["digits"]), values=tuple(sorted({min(values), max(values)})), failed=len(failed) == len(lost) > 0,
-                   missing=f"no {what} of {told}" if lost else "")
+    text = _of_seeds(study.select(entry["where"]), quantity, norm, entry) if take == "every" and "over" not in entry else ""
+    return replace(found, text=text or _text(values, entry["digits"]), values=tuple(sorted({min(values), max(values)})), failed=failed, missing="; ".join(missing),
+                   runs=[r.id for r in runs], over=[r.id for r in below], suspect=sum(run.suspect for run in runs + below))
 
 
 def numbers_of(study):
