@@ -10,7 +10,7 @@ from ..grade.convergence import fit_order
 from ..grade.targets import number
 from ..read.figure_tables import figure_kind
 from ..read.study_reader import LIST, NUMBER, TEXT
-from .drawing import Drawing, FigureError, by_series, chosen, exact_of, log_y, lower_edge, name_of, rails, sizes_axis
+from .drawing import Drawing, FigureError, by_series, chosen, exact_of, log_y, lower_edge, name_of, rails, sizes_axis, told_lost
 from .style import WIDTH, frame, legend_below, legend_shape
 
 X_NAMES = {"L": "Cell size $L$ [m]", "dt": "Time step [s]", "ppc": "Points per cell and direction",
@@ -118,7 +118,7 @@ def _scale_x(axis, sizes, x):
     axis.set_xlabel(X_NAMES.get(x, x.rsplit(".", 1)[-1]))
 
 
-def _notes(series, exact, fits, high, x):
+def _notes(series, exact, fits, high):
     notes, inexact = [], [own for label, own in series.items() if label not in exact]
     if any(own.spread for own in inexact):
         notes.append("Lines are means, bands the range")
@@ -128,10 +128,6 @@ def _notes(series, exact, fits, high, x):
         notes.append("Methods that are exact to rounding stand on the lower edge")
     if any((own.mean > high).any() for own in inexact):
         notes.append("Triangles at the upper edge are off the scale")
-    for label, own in series.items():
-        if own.lost:
-            notes.append(f"{label} gave no number at {x.rsplit('.', 1)[-1]} = " + ", ".join(f"{v:g}" for v in own.lost)
-                         + (" m" if x == "L" else ""))
     return list(dict.fromkeys(notes))
 
 
@@ -170,4 +166,5 @@ def convergence(study, entry, style):
     axis.set_ylabel(name_of(quantity, norm))
     rails(axis, failing, style, "failed")
     legend_below(figure, handles, columns)
-    return Drawing(figure, runs, _notes(series, exact, fits, high, x))
+    lost = [told_lost(label, own, x, lambda run: math.isfinite(run.value(quantity, norm))) for label, own in by_series(runs, entry, style).items()]
+    return Drawing(figure, runs, _notes(series, exact, fits, high) + [note for note in lost if note])

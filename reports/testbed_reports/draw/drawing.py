@@ -167,6 +167,21 @@ def exact_of(errors):
     return set() if len(exact) == sum(len(own) > 0 for own in errors.values()) else exact
 
 
+def told_lost(label, runs, x, gave):
+    """'lpfdm gave no number at L = 0.2 m, 0.1 m (1 of 3 seeds)': where on the axis x some or all runs gave none; '' where all did."""
+    at = {}
+    for run in runs:
+        if isinstance(run.values.get(x), (int, float)):
+            at.setdefault(run.values[x], []).append(run)
+    parts = []
+    for place, own in sorted(at.items(), reverse=True):
+        lost = sum(not gave(run) for run in own)
+        what = "seeds" if len({str(run.values.get("seed", "")) for run in own}) == len(own) else "runs"
+        if lost:
+            parts.append(f"{place:g}" + (" m" if x == "L" else "") + (f" ({lost} of {len(own)} {what})" if lost < len(own) else ""))
+    return f"{label} gave no number at {x.rsplit('.', 1)[-1]} = {', '.join(parts)}" if parts else ""
+
+
 def lower_edge(axis, at, label, style):
     """Points that are exact to rounding, on the lower edge."""
     axis.plot(at, [0.0] * len(at), transform=axis.get_xaxis_transform(), linestyle="none", marker=style.marker(label),

@@ -8,7 +8,7 @@ from ..grade.convergence import fit_power
 from ..grade.targets import in_sizes, number, values_by_size
 from ..read.figure_tables import figure_kind
 from ..read.study_reader import NUMBER, TEXT
-from .drawing import Drawing, FigureError, by_series, chosen, log_y, name_of, rails, sizes_axis
+from .drawing import Drawing, FigureError, by_series, chosen, log_y, name_of, rails, sizes_axis, told_lost
 from .style import WIDTH, frame, legend_below, legend_shape
 
 
@@ -21,15 +21,17 @@ def power_law(study, entry, style):
     for label, own in by_series(runs, entry, style).items():
         L, value = values_by_size(own, quantity, norm)
         data[label] = L[value > 0], value[value > 0]
-        laws[label] = fit_power(*values_by_size([run for run in own if in_sizes(run, entry)], quantity, norm))
+        fitted = [run for run in own if in_sizes(run, entry)]
+        laws[label] = fit_power(*values_by_size(fitted, quantity, norm))
         labels[label] = label
         if math.isfinite(laws[label].q.order):
-            labels[label] = f"{label}: a = {number(laws[label].a)}, q = {laws[label].q}"
+            few = f" ({laws[label].q.points} of {len(fitted)} runs)" if laws[label].q.points < len(fitted) else ""
+            labels[label] = f"{label}: a = {number(laws[label].a)}, q = {laws[label].q}{few}"
         lost = sorted({run.values["L"] for run in own if not run.value(quantity, norm) > 0
                        and isinstance(run.values.get("L"), (int, float))})
         if lost:
             failing[label] = lost
-            notes.append(f"{label} gave no number at L = " + ", ".join(f"{v:g}" for v in lost) + " m")
+            notes.append(told_lost(label, own, "L", lambda run: run.value(quantity, norm) > 0))
     sizes, values = (np.concatenate([pair[k] for pair in data.values()]) for k in (0, 1))
     if not len(values):
         raise FigureError(f"no completed run has a positive {quantity} {norm}".rstrip())

@@ -1,114 +1,22 @@
 """The first screen of a report: questions by method, and a few sentences, all derived from the runs."""
 import math
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
-from ..draw.drawing import name_of
 from ..draw.work_precision import ACCURACIES, cheapest, costs_of
 from ..grade import metrics
-from ..grade.dataset import groups
 from ..grade.limits import STEP_KEYS
-from ..grade.numbers import Number, number_of, taken
-from ..grade.targets import NOT_CONVERGING_ORDER, graded, in_sizes, number
+from ..grade.numbers import Number, number_of
+from ..grade.targets import NOT_CONVERGING_ORDER, graded, number
 from ..read.number_tables import DEFAULTS
-from .names import figure_anchor, figure_names, study_anchor, table_anchor
-
-BY_METHOD = ("method", "variant")
-
-
-@dataclass
-class Question:
-    """One row of the matrix. `cells`: variant -> Number or a word; `best`: the variants that answer it best. `about`: what it compares, in
-    a few words; `goal`: what the numbers are."""
-    text: str
-    about: str
-    goal: str
-    anchor: str
-    cells: dict = field(default_factory=dict)
-    best: list = field(default_factory=list)
-
-
-def words(quantity, norm):
-    """What a quantity is called, without mathematics."""
-    name = name_of(quantity, norm)
-    for sign, plain in (("$", ""), (", ", " "), ("_\\infty", "∞"), ("_", ""), ("\\mathrm{d}", "d"), ("\\tau", "τ"), ("\\sqrt{12}", "√12")):
-        name = name.replace(sign, plain)
-    return name[:1].lower() + name[1:]
+from .names import figure_anchor, figure_names, study_anchor
+from .question import BY_METHOD, Question, about_of, by_variant, marks
+from .slopes import slopes_of
 
 
 def is_static(run):
     """Whether a run is one static solve, which is another task than a motion that is damped until it rests."""
     return run.result is not None and run.result.method == "fem" and run.result.performance.get("steps", 2) <= 1
-
-
-def _variants(runs):
-    found = {}
-    for run in runs:
-        found.setdefault(run.name, []).append(run)
-    return found
-
-
-def _about(study, where, quantity, norm):
-    """'stress l2, column' and the choice beside the methods, as far as there is one."""
-    def value(v):
-        return " and ".join(map(value, v)) if isinstance(v, list) else f"{v:g}" if isinstance(v, float) else str(v)
-
-    choice = ", ".join(f"{k.rsplit('.', 1)[-1]} {value(v)}" for k, v in where.items() if k not in (*BY_METHOD, "case"))
-    case = where.get("case") if isinstance(where.get("case"), str) else study.name
-    case = case if case in study.name or study.name in case else f"{case} in {study.name}"
-    return f"{words(quantity, norm)}, {case.replace('_', ' ')}" + (f" ({choice})" if choice else "")
-
-
-def _range(target):
-    """' for L 0.5 to 2' of a target that is restricted to some sizes."""
-    ends = [f"{target[k]:g}" if k in target else "..." for k in ("L_from", "L_to")]
-    return f" for L {' to '.join(ends)}" if {"L_from", "L_to"} & set(target) else ""
-
-
-def _slopes(study):
-    """Questions for orders and exponents: those that targets ask, of every method."""
-    found = {}
-    for target in study.spec.targets:
-        kind = "exponent" if target["kind"].startswith("exponent") else "order"
-        if kind == "order" and not (target["kind"].startswith("order") or target["kind"] == "not_converging"):
-            continue
-        quantity, norm = target["quantity"], target.get("norm", "")
-        where = {k: v for k, v in target["where"].items() if k not in BY_METHOD}
-        key = (kind, quantity, norm, str(where), target.get("L_from"), target.get("L_to"))
-        about = _about(study, where, quantity, norm) + _range(target)
-        question = Question(f"{'Exponent of L' if kind == 'exponent' else 'Order'}: {about}", about, kind,
-                            table_anchor(study, f"power_law_{quantity}" if kind == "exponent" else f"{quantity}_{norm}".strip("_")))
-        for variant, runs in _variants(study.select(where)).items():
-            runs = [run for run in runs if in_sizes(run, target)]
-            if len({run.values.get("L") for run in runs}) < 2:
-                continue
-            lost = any(not run.completed for run in runs)
-            values, _ = taken(kind, runs, quantity, norm)
-            settings = groups(runs)
-            if len(settings) > 1 and kind == "order":  # of several settings the order of each
-                values = [v for own in settings.values() for v in taken(kind, own, quantity, norm)[0]]
-            most = max((abs(v) for run in runs if math.isfinite(v := run.value(quantity, norm))), default=0)
-            if kind == "order" and any(run.completed for run in runs) and not lost and most <= metrics.ROUNDING and any((quantity, norm) in run.rows for run in runs):
-                question.cells[variant] = "exact"
-            elif values:
-                text = " to ".join(dict.fromkeys(f"{v:.2f}" for v in (min(values), max(values))))
-                question.cells[variant] = Number(text + marks(runs, lost), tuple(sorted({min(values), max(values)})), study.name, quantity, norm, kind,
-                                                 [run.id for run in runs])
-            else:
-                question.cells[variant] = next((run.status for run in runs if not run.completed), "n/a")
-        numbers = {v: c.values[0] for v, c in question.cells.items() if isinstance(c, Number)}
-        whole = {v: value for v, value in numbers.items() if not question.cells[v].text.endswith(("*", "‡"))}
-        exact = [v for v, c in question.cells.items() if c == "exact"]
-        if kind == "order":
-            question.best = exact or [v for v, value in whole.items() if value >= max(whole.values()) - 0.05]
-        if question.cells:
-            found[key] = question
-    return list(found.values())
-
-
-def marks(runs, lost=False):
-    """Signs after a number: * where runs are lost, ‡ where some are suspect."""
-    return (" *" if lost else "") + (" ‡" if any(run.suspect for run in runs) else "")
 
 
 def lasting(costs, runs, accuracy):
@@ -137,8 +45,8 @@ def _reaches(study):
     found = []
     for entry in figures:
         quantity, norm = entry["quantity"], entry.get("norm", "")
-        about = _about(study, entry["where"], quantity, norm)
-        every = _variants(study.select(entry["where"]))
+        about = about_of(study, entry["where"], quantity, norm)
+        every = by_variant(study.select(entry["where"]))
         costs = {v: [c for c in costs_of(runs, entry, study.plan.get("cores"))[0] if not any(run.suspect for run in c.runs)] for v, runs in every.items()}
         for accuracy in ACCURACIES:
             question = Question(f"Seconds to {100 * accuracy:g} %: {about}", about, f"{100 * accuracy:g} %", figure_anchor(names[id(entry)]))
@@ -163,14 +71,14 @@ def _values(study):
         where = {k: v for k, v in target["where"].items() if k not in BY_METHOD}
         if not target["kind"].startswith("value") or quantity == "static":
             continue
-        about = _about(study, where, quantity, norm)
+        about = about_of(study, where, quantity, norm)
         question = Question(about[:1].upper() + about[1:], about, "value", study_anchor(study))
-        for variant, runs in _variants(study.select(where)).items():
+        for variant, runs in by_variant(study.select(where)).items():
             made = number_of(study, {**DEFAULTS, "quantity": quantity, "norm": norm, "where": {**where, "variant": variant}})
             if quantity != "modulus" and any(map(is_elastic, runs)):
                 question.cells[variant] = "elastic"
             elif made.values:
-                question.cells[variant] = replace(made, text=made.text + marks(runs, made.missing))
+                question.cells[variant] = replace(made, text=made.text + marks(runs, [run for run in runs if run.id in made.runs]))
             elif any(not run.completed for run in runs):
                 question.cells[variant] = next(run.status for run in runs if not run.completed)
         if question.cells:
@@ -197,7 +105,7 @@ def _limits(study):
 def _failures(studies):
     """The question how many runs diverged or are suspect."""
     question = Question("Runs that failed or are suspect, of all", "", "failures", "failures")
-    every = _variants([run for study in studies if not study.spec.cases for run in study.runs])
+    every = by_variant([run for study in studies if not study.spec.cases for run in study.runs])
     for variant, runs in every.items():
         bad = sum(run.suspect or not run.completed for run in runs)
         question.cells[variant] = f"{bad} of {len(runs)}"
@@ -209,7 +117,7 @@ def _failures(studies):
 def questions(studies):
     """All rows of the matrix."""
     plain = [study for study in studies if not study.spec.cases]
-    slopes, reaches = {s.folder: _slopes(s) for s in plain}, {s.folder: _reaches(s) for s in plain}
+    slopes, reaches = {s.folder: slopes_of(s) for s in plain}, {s.folder: _reaches(s) for s in plain}
     rows = [q for found in (slopes, reaches) for study in plain for q in found[study.folder]]
     rows += [q for study in plain if not slopes[study.folder] and not reaches[study.folder] for q in _values(study)]
     rows += [q for study in studies if study.spec.cases for q in _limits(study)]

@@ -97,7 +97,7 @@ def power_law_table(study, quantity):
             law = fit_power(*values_by_size(runs, quantity, norm))
             if math.isfinite(law.q.order):
                 rows.append([label, norm, f"{law.q.order:.3f}", _interval(law.q.low, law.q.high, "{:.3f}".format), number(law.a, 4),
-                             _interval(law.a_low, law.a_high, lambda v: number(v, 4)), str(law.q.points)])
+                             _interval(law.a_low, law.a_high, lambda v: number(v, 4)), str(law.q.points) + (f" of {len(runs)}" if law.q.points < len(runs) else "")])
     words = quantity.replace("_", " ")
     return Table(f"power_law_{quantity}", f"{words} = a L^q", ["variant", "norm", "q", "95 % of q", "a", "95 % of a", "runs"], rows, 2,
                  ["Least squares of the logarithms over all runs; a is the value at L = 1 m."]) if rows else None
