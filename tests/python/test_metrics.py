@@ -45,6 +45,13 @@ def test_settlement_per_probe(make):
     assert r["settlement", "middle"] == pytest.approx(0.05)
 
 
+def test_a_kinetic_energy_below_zero_is_no_rest(make):
+    """The product of the velocities of two half steps is negative where points turn: it must not pass a target from above."""
+    n, turning = 5, [100.0, 1.0, 1.0, 1.0, -0.01]
+    r = rows(make(metrics="static, energy", samples=n, history={"kinetic_energy": np.array(turning), "strain_energy": np.full(n, 2.0)}))
+    assert r["static", "kinetic_over_strain"] == pytest.approx(0.005) and r["kinetic_energy", "retained"] == pytest.approx(1e-4)
+
+
 def test_static(make):
     n = 5
     r = rows(make(metrics="static", samples=n, history={

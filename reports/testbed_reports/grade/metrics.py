@@ -83,7 +83,7 @@ def settlement(result):
 
 
 def static(result):
-    kinetic, strain = result.history("kinetic_energy")[-1], result.history("strain_energy")[-1]
+    kinetic, strain = abs(result.history("kinetic_energy")[-1]), result.history("strain_energy")[-1]  # a product of two half steps has a sign
     return {("static", "kinetic_over_strain"): kinetic / nonzero(strain, "the strain energy"),
             ("static", "unbalanced"): result.history("unbalanced_force")[-1]}
 
@@ -134,7 +134,7 @@ def energy(result):
     if total[0] > 0:
         rows["energy_gain", "max"] = np.max(total) / total[0] - 1.0
     if kinetic[0] > 0:
-        rows["kinetic_energy", "retained"] = kinetic[-1] / kinetic[0]
+        rows["kinetic_energy", "retained"] = abs(kinetic[-1]) / kinetic[0]
     if not rows:
         raise MetricError("'energy' lacks report.reference.period, and starts from rest")
     return rows
