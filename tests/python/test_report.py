@@ -11,7 +11,7 @@ from conftest import REPORTS
 from synthetic import write_result, write_study
 from testbed_reports.grade.dataset import read_study_folder
 from testbed_reports.draw.figures import draw
-from testbed_reports.page.report import build
+from testbed_reports.page.report import build, main
 from testbed_reports.draw.style import Style
 from testbed_reports.draw.table import Table, as_latex, escape
 from testbed_reports.page.tables import convergence_table, performance_table, power_law_table, study_tables
@@ -259,6 +259,14 @@ def test_every_run_lost_still_makes_a_page(tmp_path):
     folder = write_study(tmp_path / "lost", EXTRA, sizes=(1.0,), change=lambda *_: None)
     out = build([folder], tmp_path / "out", "testbed report lost")
     assert text_of(out.read_text()).count("killed by signal 9") >= 4
+
+
+@pytest.mark.parametrize("lost, code", [({}, 0), ({"status": "diverged", "reason": "x"}, 0), (None, 1), ({"status": "interrupted", "reason": "stopped"}, 1)])
+def test_exit_code_of_a_study_that_was_killed(tmp_path, capsys, lost, code):
+    """What failed is data; what never ran to its end is not."""
+    folder = write_study(tmp_path / "s", sizes=(2.0, 1.0), metrics="stress", change=lambda v, L, r: lost if (v, L) == ("lpfdm", 1.0) else {})
+    assert main([str(folder), "-o", str(tmp_path / "out")]) == code
+    assert ("lpfdm_L1_r1_0" in capsys.readouterr().err) is bool(code)
 
 
 def test_every_run_diverged_still_makes_a_page(tmp_path):

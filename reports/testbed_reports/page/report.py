@@ -146,8 +146,8 @@ def _read(folders, failures, unreadable):
         for run in study.runs:
             if (run.suspect or not run.completed) and not study.spec.cases:  # the matrix tells of these
                 failures.append([study.name, run.id, run.label, run.told])
-            if run.status == "unreadable":
-                unreadable.append(f"{study.name}: {run.id}: {run.reason}")
+            if run.status == "unreadable" or run.status in ("missing", "interrupted") and study.plan.get("runs"):
+                unreadable.append(f"{study.name}: {run.id}: " + ("" if run.status == "unreadable" else f"{run.status}: ") + run.reason)
             failures += [[study.name, run.id, "number missing", error] for error in run.errors]
     return studies
 
