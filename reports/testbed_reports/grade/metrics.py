@@ -163,19 +163,19 @@ def _probes_of_scene(result):
     return [("settlement", p["name"]) for p in result.resolved.get("probe", []) if "name" in p]
 
 
-# Group -> (function, the rows that a run which did not complete is given with value nan).
+# Group -> (function, the rows that a run which did not complete is given with value nan, the keys of report.reference that it reads).
 GROUPS = {
-    "stress": (stress, [("stress", n) for n in ("l2", "linf", "l1_yy")]),
+    "stress": (stress, [("stress", n) for n in ("l2", "linf", "l1_yy")], ("stress_scale",)),
     "displacement": (displacement, lambda r: [("displacement", n) for n in ("l2", "linf")] + (
         [("displacement", "rms_scaled")]
-        if "displacement_scale" in r.reference else [])),
-    "settlement": (settlement, _probes_of_scene),
-    "static": (static, [("static", "kinetic_over_strain"), ("static", "unbalanced")]),
-    "first_peak": (first_peak, [("first_peak", "ratio"), ("first_peak", "time")]),
-    "energy": (energy, [("energy_drift", "per_period"), ("energy_gain", "max"), ("kinetic_energy", "retained")]),
-    "momentum": (momentum, [("momentum", "error")]),
-    "angular_momentum": (angular_momentum, [("angular_momentum", "retained"), ("angular_momentum", "error")]),
-    "spurious_stress": (spurious_stress, [("spurious_stress", "max")]),
+        if "displacement_scale" in r.reference else []), ("displacement_scale",)),
+    "settlement": (settlement, _probes_of_scene, ()),
+    "static": (static, [("static", "kinetic_over_strain"), ("static", "unbalanced")], ()),
+    "first_peak": (first_peak, [("first_peak", "ratio"), ("first_peak", "time")], ("static_displacement", "peak_time")),
+    "energy": (energy, [("energy_drift", "per_period"), ("energy_gain", "max"), ("kinetic_energy", "retained")], ("period",)),
+    "momentum": (momentum, [("momentum", "error")], ("momentum_scale",)),
+    "angular_momentum": (angular_momentum, [("angular_momentum", "retained"), ("angular_momentum", "error")], ()),
+    "spurious_stress": (spurious_stress, [("spurious_stress", "max")], ()),
     **soil_metrics.GROUPS,
     **picture_metrics.GROUPS,
     **stability_metrics.GROUPS,
@@ -194,7 +194,7 @@ def grade(result):
         if group not in GROUPS:
             grades.errors.append(f"unknown metric group '{group}'{did_you_mean(group, GROUPS)}")
             continue
-        function, names = GROUPS[group]
+        function, names, _ = GROUPS[group]
         try:
             if result.status == "completed":
                 with np.errstate(all="ignore"):

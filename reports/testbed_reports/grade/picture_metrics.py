@@ -48,9 +48,9 @@ def uplift(result):
     return {("uplift", "area"): width * snapshot["displacement"][row, 1].sum(), ("uplift", "bump"): fall.max() / result.cell_size}
 
 
-# Group -> (function, the rows that a run which did not complete is given with value nan).
+# Group -> (function, the rows that a run which did not complete is given with value nan, the keys of report.reference that it reads).
 GROUPS = {
-    "inclusion": (inclusion, [("strain_share", "below"), ("strain_share", "above")]),
-    "passed": (passed, [("passed", "area"), ("passed", "depth")]),
-    "uplift": (uplift, [("uplift", "area"), ("uplift", "bump")]),
+    "inclusion": (inclusion, [("strain_share", "below"), ("strain_share", "above")], ()),
+    "passed": (passed, [("passed", "area"), ("passed", "depth")], ("door",)),
+    "uplift": (uplift, [("uplift", "area"), ("uplift", "bump")], ()),
 }

@@ -275,13 +275,13 @@ def _reaction_rows(result):
     return [(quantity, name) for name in walls for quantity in ("reaction_max", "reaction_end")]
 
 
-# Group -> (function, the rows that a run which did not complete is given with value nan).
+# Group -> (function, the rows that a run which did not complete is given with value nan, the keys of report.reference that it reads).
 GROUPS = {
-    "compression": (compression, _compression_rows),
+    "compression": (compression, _compression_rows, ("height", "width", "confinement", "plane_strain_modulus", "peak_stress", "residual_stress")),
     "shear_band": (shear_band, [("band_count", ""), ("band_angle", "first"), ("band_angle", "second"),
-                                *((quantity, name) for quantity in ("band_width", "band_width_cells") for name in ESTIMATORS)]),
-    "runout": (runout, _runout_rows),
-    "collapse_load": (collapse_load, [("collapse_load", "first"), ("collapse_load", "second")]),
-    "shear_layer": (shear_layer, _shear_layer_rows),
-    "reaction": (reaction, _reaction_rows),
+                                *((quantity, name) for quantity in ("band_width", "band_width_cells") for name in ESTIMATORS)], ("bands",)),
+    "runout": (runout, _runout_rows, ("runout", "base", "front_height", "point_spacing", "still")),
+    "collapse_load": (collapse_load, [("collapse_load", "first"), ("collapse_load", "second")], ("full_load", "collapse_displacement", "elastic_share")),
+    "shear_layer": (shear_layer, _shear_layer_rows, ("width", "peak_stress", "residual_stress", "elastic_stiffness", "postpeak_slope", "dissipation", "band_width")),
+    "reaction": (reaction, _reaction_rows, ()),
 }

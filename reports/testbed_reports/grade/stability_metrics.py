@@ -187,4 +187,5 @@ def first_time(result, key, low, high):
     return float(time[out[0]]) if len(out) and (out[0] > 0 or len(values) == 1) else None
 
 
-GROUPS = {"stability": (stability, asked)}
+READ = {key for _, _, needs in SERIES.values() for key in needs if not key.startswith("grid.")} | {"energy_start", "displacement_scale"}
+GROUPS = {"stability": (stability, asked, READ)}

@@ -14,6 +14,7 @@ from ..grade.claims import judge_claims
 from ..grade.dataset import read_study_folder, write_atomically
 from ..grade.loose import study_of
 from ..grade.metrics_csv import metrics_csv
+from ..grade.scene_words import of_runs
 from ..grade.targets import judge_all
 from ..read.study_file import StudyError
 from . import bench, findings
@@ -152,6 +153,17 @@ def _read(folders, failures, unreadable):
     return studies
 
 
+def _misnamed(studies, failures, unreadable):
+    """What the scenes' [report] tables name and nothing reads, as notes at the top; misspelt names are failures, too."""
+    notes = []
+    for study in studies:
+        misspelt, idle = of_runs(study.runs, study.spec.figures)
+        failures += [[study.name, "scene", "misspelt", text] for text in misspelt]
+        unreadable += [f"{study.name}: {text}" for text in misspelt]
+        notes += [f"{study.name}: {text}." for text in misspelt + idle]
+    return notes
+
+
 def _claims(judged, ledger):
     """Claims as the template wants them."""
     for claim in judged:
@@ -217,6 +229,7 @@ def build(folders, out, command, unreadable=None, against=None, pgf=False):
     failures += [[study, what, "not made", why] for study, what, why in ledger.missing]
     unreadable += [f"{name}: {what}: {reason}" for name, what, how, reason in failures if how in ("not drawn", "not made")]
     rows, warnings = provenance(studies, command)
+    warnings = _misnamed(studies, failures, unreadable) + warnings
     left_out = [[s.name, e.get("variant") or "", ", ".join(f"{k} = {v}" for k, v in e.get("axes", {}).items()),
                  e.get("reason", "")] for s in studies for e in s.left_out]
     titles = [section["title"] for section in sections]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..grade import metrics
 from ..grade.dataset import OWN_RUN
+from ..grade.scene_words import misnamed
 from ..read.results import Result, ResultError
 
 # What a report shows of a run, beside its metrics: attributes or fields, and what goes without them.
@@ -57,7 +58,8 @@ def examine(path):
     grades = metrics.grade(result)
     numbers = [" ".join(key).strip() for key, value in grades.rows.items() if key[0] not in metrics.ALWAYS and np.isfinite(value)]
     what += f"; graded: {', '.join(numbers)}" if numbers else "; nothing graded"
-    missing = [f"not graded: {error}" for error in grades.errors if "/performance" not in error]
+    missing = [f"not graded: {error}" for error in grades.errors if "/performance" not in error and "unknown metric" not in error]
+    missing += [text for part in misnamed(result.metrics, result.resolved.get("report", {}).get("reference", {}), []) for text in part]
     return what, _shapes(result), _lacks(result) + missing
 
 

@@ -4,6 +4,7 @@ import subprocess
 import tomllib
 from dataclasses import replace
 
+from ..grade.scene_words import of_scene
 from ..read.study_file import StudyError, same, toml_value
 
 
@@ -69,6 +70,13 @@ def refuse_twins(study, chosen, scenes):
         if all(other == text for text, other in pairs):
             told = ", ".join(f"{k} = {first.axes.get(k)} and {v}" for k, v in change.items())
             raise StudyError(f"{study.path}: {told} are the same scene: an axis has no effect")
+
+
+def refuse_misspelt(study, chosen, scenes):
+    """A name in a scene's [report] that is another one misspelt would be left out of the grades without a word."""
+    told = [f"{combination.scene}: {text}" for (combination, _), (_, resolved) in zip(chosen, scenes) for text in of_scene(resolved, study.figures)[0]]
+    if told:
+        raise StudyError("\n".join(dict.fromkeys(told)))
 
 
 def resolve(testbed, combination):

@@ -13,11 +13,12 @@ from pathlib import Path
 
 from ..grade.dataset import PLAN, digest, read_study_folder, write_atomically
 from ..grade.metrics_csv import metrics_csv
+from ..grade.scene_words import of_runs
 from ..grade.targets import as_text, judge_all
 from ..read.results import is_finished, seed_of
 from ..read.study_file import StudyError, read_study, toml_value
 from .campaign import job, run_by_snakemake
-from .resolve import Refused, method_of, refusals, refuse_twins, resolve, run_arguments, with_own_constants
+from .resolve import Refused, method_of, refusals, refuse_misspelt, refuse_twins, resolve, run_arguments, with_own_constants
 from .runner import Task, run_all
 from .search import Searches, name_of
 
@@ -111,6 +112,7 @@ def expand(study, combinations, testbed, folder, keep, jobs):
         if refused:
             raise StudyError(refusals(refused))
     refuse_twins(study, chosen, scenes)
+    refuse_misspelt(study, chosen, scenes)
 
     entries, tasks = [], []
     for (combination, method), (text, resolved) in zip(chosen, scenes):
@@ -228,6 +230,8 @@ def run_study(study, testbed, out, options, command):
         for run in data.runs:
             for error in run.errors:
                 progress.say(f"{study.name}: {run.id}: {error}")
+        for text in of_runs(data.runs, data.spec.figures)[1]:
+            progress.say(f"{study.name}: {text}")
         problems = [f"{study.name}: {name}: {reason}" for name, reason in failed.items()]
         return problems, interrupted, data
 
