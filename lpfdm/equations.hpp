@@ -8,10 +8,12 @@
 namespace testbed
 {
 /// What the points of one bin give to its S x S cells: mass and, times volume, the stress beyond the confining pressure.
-template <class Support>
+template <class Support, AnyPack Pack = testbed::Pack>
 class CellSums
 {
 public:
+    template <AnyPack Other>
+    using In = CellSums<Support, Other>;
     static constexpr int S = Support::S, dim = Body::dim;
     static constexpr std::size_t blocks = block_size<S, dim>, stresses = symmetric_components<dim>, quantities = 1 + stresses,
                                  numbers = blocks * quantities;
@@ -20,9 +22,9 @@ public:
 
     /// Points [p, p + lanes) of the body, with their support at c.
     template <class Lanes>
-    TESTBED_INLINE void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner<dim>& c)
+    TESTBED_INLINE void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner<dim, Pack>& c)
     {
-        const Weights<Support, dim> weights(c);
+        const Weights<Support, dim, Pack> weights(c);
         Pack v = lanes.keep(volume<Support>(body.points, p, lanes));
         if constexpr (S == 1)
             v = min(v, Pack(body.counted_volume));
@@ -229,7 +231,8 @@ struct BinMotion
             return {1 + mid.from[0], 1 + mid.from[1]};
     }
     /// Displacement gradient of the points with these boxes over the step; their displacement is added to x.
-    TESTBED_INLINE Gradient<2, Pack> operator()(const Box<2>& box, double dt, Vec<2, Pack>& x) const
+    template <AnyPack Pack>
+    TESTBED_INLINE Gradient<2, Pack> operator()(const Box<2, Pack>& box, double dt, Vec<2, Pack>& x) const
     {
         Gradient<2, Pack> g = Pack(1.0) * coefficients[0];
         std::array<std::array<Pack, S + 1>, 2> weights;
@@ -255,16 +258,19 @@ struct BinMotion
 
 private:
     /// Of a box in the next cell, with its middle this far beyond the line; at mid-step it may lie in either.
-    TESTBED_INLINE static Pack share(Pack beyond, Pack half, Pack inverse)
+    template <AnyPack Pack>
+    TESTBED_INLINE static Pack share(const Pack& beyond, const Pack& half, const Pack& inverse)
     {
         return min(max(beyond + half, Pack(0.0)) * inverse, Pack(1.0));
     }
     /// Bilinear weights of three nodes, this far beyond the middle one [cells].
-    TESTBED_INLINE static std::array<Pack, 3> hat(Pack beyond)
+    template <AnyPack Pack>
+    TESTBED_INLINE static std::array<Pack, 3> hat(const Pack& beyond)
     {
         const Pack high = max(beyond, Pack(0.0)), low = high - beyond;
         return {low, Pack(1.0) - low - high, high};
     }
+    template <AnyPack Pack>
     TESTBED_INLINE void displace(const std::array<std::array<Pack, S + 1>, 2>& weights, double dt, Vec<2, Pack>& x) const
     {
         Vec<2, Pack> u;
@@ -294,15 +300,19 @@ void move_points(const LpfdmGrid<2>& grid, const MidSteps& mid_steps, Body& body
         {
             const BinMotion<Support> motion(grid, bins[b], mid_steps);
             const BinFrame<2> frame(grid.lattice, bins[b], motion.origin());
-            for_each_pack(bins[b].begin, bins[b].end,
-                          [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                          {
-                              Vec<2, Pack> x = load(q.x, p, lanes);
-                              const Gradient<2, Pack> g = motion(frame.template box<Support>(q, p, lanes, x), dt, x);
-                              keep(p, lanes, g);
-                              stretch<Support>(q, p, lanes, increment, g);
-                              store(q.x, p, lanes, x);
-                          });
+            with_packs_for(bins[b].end - bins[b].begin,
+                           [&]<AnyPack P>(const P&) TESTBED_INLINE
+                           {
+                               for_each_pack<P>(bins[b].begin, bins[b].end,
+                                                [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                                                {
+                                                    auto x = load(q.x, p, lanes);
+                                                    const auto g = motion(frame.template box<Support>(q, p, lanes, x), dt, x);
+                                                    keep(p, lanes, g);
+                                                    stretch<Support>(q, p, lanes, increment, g);
+                                                    store(q.x, p, lanes, x);
+                                                });
+                           });
         },
         [&](std::size_t b) TESTBED_INLINE
         {

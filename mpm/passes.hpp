@@ -14,20 +14,24 @@ template <class Strain, bool with_remap, class Shape, class Update>
 void update_velocity(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, Update& rule)
 {
     using Momentum = NodeSums<Shape, Strain, Scatter::momentum>;
-    cloud.for_each_bin(grid.lattice,
-                       [&](Body& body, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_FLATTEN
-                       {
-                           Points<2>& q = body.points;
-                           const auto update = rule.template in_bin<Shape::S>(grid.lattice, grid.nodes, body, bin);
-                           for_each_pack(bin.begin, bin.end,
-                                         [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                                         {
-                                             const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                                             update.update(q, p, lanes, at);
-                                         });
-                           if constexpr (with_remap)
-                               sum_bin<Shape, Momentum>(grid.lattice, body, bin, &cloud.workspace[number * Momentum::numbers]);
-                       });
+    cloud.for_each_bin(
+        grid.lattice,
+        [&](Body& body, const Bin<2>& bin, std::size_t number, const BinFrame<2>& frame) TESTBED_FLATTEN
+        {
+            Points<2>& q = body.points;
+            const auto update = rule.template in_bin<Shape::S>(grid.lattice, grid.nodes, body, bin);
+            with_packs_for(bin.end - bin.begin,
+                           [&]<AnyPack P>(const P&) TESTBED_INLINE
+                           {
+                               for_each_pack<P>(bin.begin, bin.end,
+                                                [&](std::size_t p, const auto& lanes) TESTBED_INLINE {
+                                                    update.update(q, p, lanes,
+                                                                  shape_at<Shape>(frame.template corner<Shape>(q, p, lanes), frame.scale));
+                                                });
+                           });
+            if constexpr (with_remap)
+                sum_bin<Shape, Momentum>(grid.lattice, body, bin, &cloud.workspace[number * Momentum::numbers]);
+        });
 }
 
 /// A nodal field goes to the points and back.
@@ -105,19 +109,20 @@ void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIn
         const typename Strain::template InBin<Shape> strain(grid.lattice, q, bin);
         const NodalVelocity<Shape::S> carrier(grid.lattice, bin, carrier_velocity), v(grid.lattice, bin, grid.nodes.v);
         bool left = false;
-        for_each_pack(bin.begin, bin.end,
-                      [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                      {
-                          const ShapeAt<Shape> at(frame.template corner<Shape>(q, p, lanes), frame.scale);
-                          const Gradient<2, Pack> d = increment.of(v.template gradient<Strain>(at, strain, dt));
-                          keep(p, lanes, d);
-                          stretch<Shape>(q, p, lanes, increment, d);
-                          Vec<2, Pack> x = carrier.at(at);
-                          unrolled<2>([&](auto i) TESTBED_INLINE { x[i] = lanes.load(&q.x[i][p]) + x[i] * Pack(dt); });
-                          store(q.x, p, lanes, x);
-                          if constexpr (!with_stress)  // else the sums of the bin tell
-                              left |= stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x)));
-                      });
+        const auto move_pack = [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+        {
+            using Pack = typename std::decay_t<decltype(lanes)>::Pack;
+            const auto at = shape_at<Shape>(frame.template corner<Shape>(q, p, lanes), frame.scale);
+            const auto d = increment.of(v.template gradient<Strain>(at, strain, dt));
+            keep(p, lanes, d);
+            stretch<Shape>(q, p, lanes, increment, d);
+            auto x = carrier.at(at);
+            unrolled<2>([&](auto i) TESTBED_INLINE { x[i] = lanes.load(&q.x[i][p]) + x[i] * Pack(dt); });
+            store(q.x, p, lanes, x);
+            if constexpr (!with_stress)  // else the sums of the bin tell
+                left |= stdx::any_of(frame.template left<Shape>(q, p, lanes, frame.template corner<Shape>(q, p, lanes, x)));
+        };
+        with_packs_for(bin.end - bin.begin, [&]<AnyPack P>(const P&) TESTBED_INLINE { for_each_pack<P>(bin.begin, bin.end, move_pack); });
         return left;
     };
     if constexpr (with_stress)
@@ -137,7 +142,7 @@ void move_points(Cloud<Shape>& cloud, const MpmGrid<Shape>& grid, const StrainIn
         cloud.for_each_bin(grid.lattice,
                            [&](Body& body, const Bin<2>& bin, std::size_t, const BinFrame<2>&) TESTBED_FLATTEN
                            {
-                               if (move(body, bin, [](std::size_t, const auto&, const Gradient<2, Pack>&) {}))
+                               if (move(body, bin, [](std::size_t, const auto&, const auto&) {}))
                                    body.bins.mark(static_cast<std::size_t>(&bin - body.bins.list().data()));
                            });
 }

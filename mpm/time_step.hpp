@@ -139,7 +139,7 @@ struct PointOperator
             shear[2 * k + 1] = x;
             if constexpr (requires { strain.mean; })
             {
-                const double dx = 0.5 * (strain.mean[k][0][0] - x), dy = 0.5 * (strain.mean[k][1][0] - y);
+                const double dx = 0.5 * (strain.mean[k][0] - x), dy = 0.5 * (strain.mean[k][1] - y);
                 xx[2 * k] += dx;
                 yy[2 * k] += dx;
                 xx[2 * k + 1] += dy;

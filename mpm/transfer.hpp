@@ -21,13 +21,14 @@ concept NodalShape = requires
 };
 
 /// Values and gradients of the S^dim shape functions at a pack of points; gradients in 1/m.
-template <NodalShape Shape, int dim = Body::dim>
+template <NodalShape Shape, int dim = Body::dim, AnyPack P = Pack>
 struct ShapeAt
 {
+    using Pack = P;
     static constexpr int S = Shape::S;
     std::array<std::array<Pack, S>, dim> weights, slopes;
 
-    TESTBED_INLINE ShapeAt(const Corner<dim>& c, double scale)
+    TESTBED_INLINE ShapeAt(const Corner<dim, Pack>& c, double scale)
     {
         if constexpr (Shape::has_box)
         {
@@ -70,6 +71,12 @@ struct ShapeAt
     }
 };
 
+template <NodalShape Shape, int dim, AnyPack Pack>
+TESTBED_INLINE inline auto shape_at(const Corner<dim, Pack>& c, double scale)
+{
+    return ShapeAt<Shape, dim, Pack>(c, scale);
+}
+
 /// Strain at each point ("four-point").
 struct PointStrain
 {
@@ -86,7 +93,7 @@ struct NoSum
 };
 
 /// The centroid of a cell's points by volume.
-template <int dim = Body::dim>
+template <int dim = Body::dim, AnyPack Pack = testbed::Pack>
 class Centroid
 {
 public:
@@ -104,13 +111,13 @@ public:
     {
         static_assert(Shape::S == 2 && !Shape::is_smooth);
         const double all = sum(volume_);
-        Corner<dim> c;
+        Corner<dim, Pack> c;
         for (std::size_t d = 0; d < dim; ++d)
         {
             c.a[d] = Pack(sum(moment_[d]) / all);
             c.width[d] = Pack(0.0);
         }
-        const ShapeAt<Shape, dim> at(c, scale);
+        const auto at = shape_at<Shape>(c, scale);
         std::array<Vec<dim>, nodes> g;
         unrolled<nodes>([&](auto k) { unrolled<dim>([&](auto d) { g[k][d] = at.template gradient<k>()[d][0]; }); });
         return g;
@@ -130,24 +137,25 @@ struct BBarStrain
     struct InBin
     {
         static constexpr int dim = Body::dim;
-        std::array<Vec<dim, Pack>, Centroid<dim>::nodes> mean;
+        std::array<Vec<dim>, Centroid<dim>::nodes> mean;
 
         InBin(const Lattice<dim>& lattice, const Points<dim>& q, const Bin<dim>& bin)
         {
             const BinFrame<dim> frame(lattice, bin);
-            Centroid<dim> centroid;
-            for_each_pack(bin.begin, bin.end,
-                          [&](std::size_t p, const auto& lanes)
-                          {
-                              Corner<dim> c = frame.template corner<Shape>(q, p, lanes);
-                              for (Pack& a : c.a)
-                                  a = lanes.keep(a);
-                              centroid.add(lanes.keep(volume<Shape>(q, p, lanes)), c.a);
-                          });
-            const auto gradients = centroid.template gradients<Shape>(frame.scale);
-            for (std::size_t k = 0; k < mean.size(); ++k)
-                for (std::size_t d = 0; d < dim; ++d)
-                    mean[k][d] = Pack(gradients[k][d]);
+            mean = with_packs_for(bin.end - bin.begin,
+                                  [&]<AnyPack P>(const P&)
+                                  {
+                                      Centroid<dim, P> centroid;
+                                      for_each_pack<P>(bin.begin, bin.end,
+                                                       [&](std::size_t p, const auto& lanes)
+                                                       {
+                                                           auto c = frame.template corner<Shape>(q, p, lanes);
+                                                           for (P& a : c.a)
+                                                               a = lanes.keep(a);
+                                                           centroid.add(lanes.keep(volume<Shape>(q, p, lanes)), c.a);
+                                                       });
+                                      return centroid.template gradients<Shape>(frame.scale);
+                                  });
         }
     };
 };
@@ -164,10 +172,12 @@ inline constexpr std::size_t sums_of = (what == Scatter::force ? 0 : 1 + Body::d
 
 /// What the points of one bin give to its S^dim nodes: m_i = sum m N_i, (m v)_i = sum m v N_i, f_i = -sum V (sigma + p I) . grad N_i
 /// with the confining pressure p. With B-bar the mean in-plane stress works on the cell's dilatation: dual to NodalVelocity::gradient().
-template <class Shape, class Strain, Scatter what>
+template <class Shape, class Strain, Scatter what, AnyPack Pack = testbed::Pack>
 class NodeSums
 {
 public:
+    template <AnyPack Other>
+    using In = NodeSums<Shape, Strain, what, Other>;
     static constexpr int S = Shape::S, dim = Body::dim;
     static constexpr std::size_t blocks = block_size<S, dim>, Q = sums_of<what>, numbers = blocks * Q;
 
@@ -175,9 +185,9 @@ public:
 
     /// Points [p, p + lanes) of the body, with their support at c.
     template <class Lanes>
-    TESTBED_INLINE void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner<dim>& c)
+    TESTBED_INLINE void add(const Body& body, std::size_t p, const Lanes& lanes, const Corner<dim, Pack>& c)
     {
-        const ShapeAt<Shape, dim> at(c, scale_);
+        const ShapeAt<Shape, dim, Pack> at(c, scale_);
         const Points<dim>& q = body.points;
         [[maybe_unused]] Pack mass;
         [[maybe_unused]] Vec<dim, Pack> momentum;
@@ -237,7 +247,7 @@ private:
     double scale_;
     std::array<Pack, numbers> total_;
     [[no_unique_address]] std::conditional_t<Strain::averaged, Pack, NoSum> mean_{};
-    [[no_unique_address]] std::conditional_t<Strain::averaged, Centroid<dim>, NoSum> strain_{};
+    [[no_unique_address]] std::conditional_t<Strain::averaged, Centroid<dim, Pack>, NoSum> strain_{};
 };
 
 /// The sums of all bins of a body, anew.
@@ -267,8 +277,9 @@ struct NodalVelocity
         }
     }
     template <class At>
-    TESTBED_INLINE Vec<dim, Pack> at(const At& at) const
+    TESTBED_INLINE Vec<dim, typename At::Pack> at(const At& at) const
     {
+        using Pack = typename At::Pack;
         Vec<dim, Pack> u;
         set_zero(u);
         unrolled<blocks>(
@@ -281,8 +292,9 @@ struct NodalVelocity
     }
     /// Gradient of the increment over dt, with the dilatation that `strain` prescribes.
     template <class Strain, class At, class InBin>
-    TESTBED_INLINE Gradient<dim, Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
+    TESTBED_INLINE Gradient<dim, typename At::Pack> gradient(const At& at, [[maybe_unused]] const InBin& strain, double dt) const
     {
+        using Pack = typename At::Pack;
         Gradient<dim, Pack> g;
         [[maybe_unused]] Pack dilatation(0.0);
         unrolled<blocks>(
@@ -292,7 +304,7 @@ struct NodalVelocity
                 unrolled<dim>([&](auto i) TESTBED_INLINE
                               { unrolled<dim>([&](auto j) TESTBED_INLINE { component<i, j>(g) += slope[j] * Pack(v[i][k]); }); });
                 if constexpr (Strain::averaged)
-                    dilatation += total<dim>([&](auto d) TESTBED_INLINE { return strain.mean[k][d] * Pack(v[d][k]); });
+                    dilatation += total<dim>([&](auto d) TESTBED_INLINE { return Pack(strain.mean[k][d]) * Pack(v[d][k]); });
             });
         if constexpr (Strain::averaged)
         {

@@ -38,21 +38,22 @@ struct BlendUpdate
     struct InBin
     {
         NodalVelocity<S> increment, total;
-        Pack flip, pic;
+        double flip, pic;
 
         template <class At, class Lanes>
         TESTBED_INLINE void update(Points<Body::dim>& q, std::size_t p, const Lanes& lanes, const At& at) const
         {
+            using Pack = typename At::Pack;
             const auto dv = increment.at(at), v = total.at(at);
             unrolled<Body::dim>([&](auto d) TESTBED_INLINE
-                                { lanes.store(&q.v[d][p], flip * (lanes.load(&q.v[d][p]) + dv[d]) + pic * v[d]); });
+                                { lanes.store(&q.v[d][p], Pack(flip) * (lanes.load(&q.v[d][p]) + dv[d]) + Pack(pic) * v[d]); });
         }
     };
     template <int S>
     TESTBED_INLINE InBin<S> in_bin(const Lattice<Body::dim>& lattice, const Nodes<Body::dim>& nodes, const Body&,
                                    const Bin<Body::dim>& bin) const
     {
-        return {NodalVelocity<S>(lattice, bin, nodes.f), NodalVelocity<S>(lattice, bin, nodes.v), Pack(flip), Pack(1 - flip)};
+        return {NodalVelocity<S>(lattice, bin, nodes.f), NodalVelocity<S>(lattice, bin, nodes.v), flip, 1 - flip};
     }
 };
 }  // namespace testbed

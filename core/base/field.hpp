@@ -116,14 +116,15 @@ concept ComponentList = requires(List list)
 };
 
 template <ComponentList List, std::size_t n, class Lanes>
-TESTBED_INLINE inline std::array<Pack, n> load(const std::array<List, n>& lists, std::size_t i, const Lanes& lanes)
+TESTBED_INLINE inline std::array<typename Lanes::Pack, n> load(const std::array<List, n>& lists, std::size_t i, const Lanes& lanes)
 {
-    std::array<Pack, n> v;
+    std::array<typename Lanes::Pack, n> v;
     unrolled<n>([&](auto d) TESTBED_INLINE { v[d] = lanes.load(&lists[d][i]); });
     return v;
 }
 template <ComponentList List, std::size_t n, class Lanes>
-TESTBED_INLINE inline void store(std::array<List, n>& lists, std::size_t i, const Lanes& lanes, const std::array<Pack, n>& v)
+TESTBED_INLINE inline void store(std::array<List, n>& lists, std::size_t i, const Lanes& lanes,
+                                 const std::array<typename Lanes::Pack, n>& v)
 {
     unrolled<n>([&](auto d) TESTBED_INLINE { lanes.store(&lists[d][i], v[d]); });
 }

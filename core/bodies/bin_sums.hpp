@@ -12,21 +12,25 @@ namespace testbed
 template <class Support, class Sums, int dim>
 TESTBED_INLINE inline bool sum_bin(const Lattice<dim>& lattice, const Body& body, const Bin<dim>& bin, double* to)
 {
-    const BinFrame<dim> frame(lattice, bin);
-    Sums sums(lattice, bin);
-    Mask left(false);
-    for_each_pack(bin.begin, bin.end,
-                  [&](std::size_t p, const auto& lanes) TESTBED_INLINE
-                  {
-                      const Corner<dim> c = frame.template corner<Support>(body.points, p, lanes);
-                      left |= frame.template left<Support>(body.points, p, lanes, c);
-                      sums.add(body, p, lanes, c);
-                  });
-    sums.write(body, bin, to);
-    return stdx::any_of(left);
+    return with_packs_for(bin.end - bin.begin,
+                          [&]<AnyPack P>(const P&) TESTBED_INLINE
+                          {
+                              const BinFrame<dim> frame(lattice, bin);
+                              typename Sums::template In<P> sums(lattice, bin);
+                              typename P::mask_type left(false);
+                              for_each_pack<P>(bin.begin, bin.end,
+                                               [&](std::size_t p, const auto& lanes) TESTBED_INLINE
+                                               {
+                                                   const auto c = frame.template corner<Support>(body.points, p, lanes);
+                                                   left |= frame.template left<Support>(body.points, p, lanes, c);
+                                                   sums.add(body, p, lanes, c);
+                                               });
+                              sums.write(body, bin, to);
+                              return stdx::any_of(left);
+                          });
 }
 
-/// @tparam Sums of one bin: Sums::numbers, Sums(lattice, bin), add(body, p, lanes, corner), write(body, bin, to)
+/// @tparam Sums of one bin: Sums::numbers, and by packs P Sums::In<P>(lattice, bin), add(body, p, lanes, corner), write(body, bin, to)
 template <class Support, class Sums>
 class BinSums
 {

@@ -34,8 +34,9 @@ struct Body
 
 /// What makes forces at the points [p, p + lanes) [Pa]: their stress beyond the confining pressure. The one place that puts it together.
 template <class Lanes>
-TESTBED_INLINE inline SymTensor<Body::dim, Pack> total_stress(const Body& body, std::size_t p, const Lanes& lanes)
+TESTBED_INLINE inline SymTensor<Body::dim, typename Lanes::Pack> total_stress(const Body& body, std::size_t p, const Lanes& lanes)
 {
+    using Pack = typename Lanes::Pack;
     SymTensor<Body::dim, Pack> s = body.points.stress_at(p, lanes);
     unrolled<Body::dim>([&](auto d) TESTBED_INLINE { component<d, d>(s) += Pack(body.confinement); });
     return s;

@@ -20,7 +20,7 @@ public:
         values_ = 4 * stride_ > near_.size() ? far_.data() : near_.data();
     }
     template <class Lanes>
-    TESTBED_INLINE void store(std::size_t k, const Lanes& lanes, const Gradient<2, Pack>& d)
+    TESTBED_INLINE void store(std::size_t k, const Lanes& lanes, const Gradient<2, typename Lanes::Pack>& d)
     {
         double* to = values_ + k;
         lanes.store(to, d.xx);
@@ -64,7 +64,7 @@ void update_stress_in_runs(Body& body, Strain&& strain, Finish&& finish)
                              ++end;
                          increments.begin(bins[end - 1].end - begin);
                          for (std::size_t b = first; b < end; ++b)
-                             strain(b, [&](std::size_t p, const auto& lanes, const Gradient<2, Pack>& d) TESTBED_INLINE
+                             strain(b, [&](std::size_t p, const auto& lanes, const auto& d) TESTBED_INLINE
                                     { increments.store(p - begin, lanes, d); });
                          update_stress(body, begin, bins[end - 1].end, increments);
                          for (std::size_t b = first; b < end; ++b)
@@ -83,7 +83,7 @@ void update_stress(Body& body, Strain&& strain, Finish&& finish)
         parallel_for(body.bins.list().size(),
                      [&](std::size_t b) TESTBED_FLATTEN
                      {
-                         strain(b, [&](std::size_t p, const auto& lanes, const Gradient<2, Pack>& d) TESTBED_INLINE
+                         strain(b, [&](std::size_t p, const auto& lanes, const auto& d) TESTBED_INLINE
                                 { law.update(body.points, p, lanes, d); });
                          finish(b);
                      });

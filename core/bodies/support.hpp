@@ -43,15 +43,15 @@ struct DomainSupport
 };
 
 /// Where the supports of a pack of points begin in their bin, and how wide they are [cells].
-template <int dim>
+template <int dim, AnyPack Pack = testbed::Pack>
 struct Corner
 {
     Vec<dim, Pack> a, width;
 };
 
 /// 1 over each width by one division: divisions cost as much as all else.
-template <int dim>
-TESTBED_INLINE inline Vec<dim, Pack> inverse_widths(const Corner<dim>& c)
+template <int dim, AnyPack Pack>
+TESTBED_INLINE inline Vec<dim, Pack> inverse_widths(const Corner<dim, Pack>& c)
 {
     Pack all = c.width[0];
     unrolled<dim - 1>([&](auto d) TESTBED_INLINE { all *= c.width[d + 1]; });
@@ -82,13 +82,13 @@ TESTBED_INLINE inline T block_product(const std::array<std::array<T, S>, dim>& f
 }
 
 /// Weights in each direction.
-template <class Support, int dim>
+template <class Support, int dim, AnyPack Pack = testbed::Pack>
 struct Weights
 {
     static constexpr int S = Support::S;
     std::array<std::array<Pack, S>, dim> along;
 
-    TESTBED_INLINE explicit Weights(const Corner<dim>& c)
+    TESTBED_INLINE explicit Weights(const Corner<dim, Pack>& c)
     {
         if constexpr (Support::has_box)
         {
@@ -106,8 +106,14 @@ struct Weights
     }
 };
 
+template <class Support, int dim, AnyPack Pack>
+TESTBED_INLINE inline auto weights_at(const Corner<dim, Pack>& c)
+{
+    return Weights<Support, dim, Pack>(c);
+}
+
 /// The middles of a pack of boxes in their bin, and their half widths [cells]; points without a box have none.
-template <int dim>
+template <int dim, AnyPack Pack = testbed::Pack>
 struct Box
 {
     Vec<dim, Pack> x, half;
@@ -129,9 +135,10 @@ struct BinFrame
     }
 
     template <class Support, class Lanes>
-    TESTBED_INLINE Box<dim> box(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Vec<dim, Pack>& x) const
+    TESTBED_INLINE auto box(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Vec<dim, typename Lanes::Pack>& x) const
     {
-        Box<dim> b;
+        using Pack = typename Lanes::Pack;
+        Box<dim, Pack> b;
         unrolled<dim>(
             [&](auto d) TESTBED_INLINE
             {
@@ -144,10 +151,11 @@ struct BinFrame
         return b;
     }
     template <class Support, class Lanes>
-    TESTBED_INLINE Corner<dim> corner(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Vec<dim, Pack>& x) const
+    TESTBED_INLINE auto corner(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Vec<dim, typename Lanes::Pack>& x) const
     {
-        const Box<dim> b = box<Support>(q, p, lanes, x);
-        Corner<dim> c;
+        using Pack = typename Lanes::Pack;
+        const Box<dim, Pack> b = box<Support>(q, p, lanes, x);
+        Corner<dim, Pack> c;
         unrolled<dim>(
             [&](auto d) TESTBED_INLINE
             {
@@ -160,16 +168,17 @@ struct BinFrame
         return c;
     }
     template <class Support, class Lanes>
-    TESTBED_INLINE Corner<dim> corner(const Points<dim>& q, std::size_t p, const Lanes& lanes) const
+    TESTBED_INLINE auto corner(const Points<dim>& q, std::size_t p, const Lanes& lanes) const
     {
         return corner<Support>(q, p, lanes, load(q.x, p, lanes));
     }
     /// Which of the points, with their support at c, may no longer belong to the bin: the support begins in another one, the point has
     /// left the lattice or is turned inside out.
     template <class Support, class Lanes>
-    TESTBED_INLINE Mask left(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Corner<dim>& c) const
+    TESTBED_INLINE auto left(const Points<dim>& q, std::size_t p, const Lanes& lanes, const Corner<dim, typename Lanes::Pack>& c) const
     {
-        Mask in(true);
+        using Pack = typename Lanes::Pack;
+        typename Lanes::Mask in(true);
         if constexpr (!Support::has_box)
             in = lanes.load(&q.volume[p]) > Pack(0.0);
         unrolled<dim>(
@@ -186,13 +195,18 @@ struct BinFrame
 
 private:
     /// A coordinate in cells, of n.
-    TESTBED_INLINE static Mask is_inside(Pack v, int n) { return v > Pack(bin_tolerance) && v < Pack(n - bin_tolerance); }
+    template <AnyPack Pack>
+    TESTBED_INLINE static auto is_inside(const Pack& v, int n)
+    {
+        return v > Pack(bin_tolerance) && v < Pack(n - bin_tolerance);
+    }
 };
 
 /// Volume of a pack of points [m^2, in three dimensions m^3].
 template <class Support, int dim, class Lanes>
-TESTBED_INLINE inline Pack volume(const Points<dim>& q, std::size_t p, const Lanes& lanes)
+TESTBED_INLINE inline typename Lanes::Pack volume(const Points<dim>& q, std::size_t p, const Lanes& lanes)
 {
+    using Pack = typename Lanes::Pack;
     if constexpr (Support::has_box)
     {
         Pack v(1 << dim);
@@ -206,7 +220,7 @@ TESTBED_INLINE inline Pack volume(const Points<dim>& q, std::size_t p, const Lan
 /// Volume, or box, of a pack of points after the strain increment g.
 template <class Support, int dim, class Lanes>
 TESTBED_INLINE inline void stretch(Points<dim>& q, std::size_t p, const Lanes& lanes, const StrainIncrement& increment,
-                                   const Gradient<dim, Pack>& g)
+                                   const Gradient<dim, typename Lanes::Pack>& g)
 {
     if constexpr (Support::has_box)
         unrolled<dim>([&](auto d) TESTBED_INLINE

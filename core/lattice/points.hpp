@@ -95,12 +95,12 @@ struct Points
     bool has_box() const { return half_width[0].active(); }
     SymTensor<dim> stress_at(std::size_t p) const { return tensor_of<SymTensor<dim>>(at(stress, p)); }
     template <class Lanes>
-    TESTBED_INLINE SymTensor<dim, Pack> stress_at(std::size_t p, const Lanes& lanes) const
+    TESTBED_INLINE SymTensor<dim, typename Lanes::Pack> stress_at(std::size_t p, const Lanes& lanes) const
     {
-        return tensor_of<SymTensor<dim, Pack>>(load(stress, p, lanes));
+        return tensor_of<SymTensor<dim, typename Lanes::Pack>>(load(stress, p, lanes));
     }
     template <class Lanes>
-    TESTBED_INLINE void set_stress(std::size_t p, const Lanes& lanes, const SymTensor<dim, Pack>& s)
+    TESTBED_INLINE void set_stress(std::size_t p, const Lanes& lanes, const SymTensor<dim, typename Lanes::Pack>& s)
     {
         unrolled<symmetric_components<dim>>([&](auto k) TESTBED_INLINE { lanes.store(&stress[k][p], component<k>(s)); });
     }

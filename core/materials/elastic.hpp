@@ -132,21 +132,21 @@ struct Hypoelastic : ElasticPart
 
     /// The same on the points [p, p + lanes).
     template <class Lanes>
-    TESTBED_INLINE void update(Points<2>& q, std::size_t p, const Lanes& lanes, const Gradient<2, Pack>& d) const
+    TESTBED_INLINE void update(Points<2>& q, std::size_t p, const Lanes& lanes, const Gradient<2, typename Lanes::Pack>& d) const
     {
-        State<Pack> state = load(q, p, lanes);
+        auto state = load(q, p, lanes);
         update(state, d);
         store(q, p, lanes, state);
     }
 
 protected:
     template <class Lanes>
-    static State<Pack> load(const Points<2>& q, std::size_t p, const Lanes& lanes)
+    static State<typename Lanes::Pack> load(const Points<2>& q, std::size_t p, const Lanes& lanes)
     {
         return {q.stress_at(p, lanes)};
     }
     template <class Lanes>
-    static void store(Points<2>& q, std::size_t p, const Lanes& lanes, const State<Pack>& state)
+    static void store(Points<2>& q, std::size_t p, const Lanes& lanes, const State<typename Lanes::Pack>& state)
     {
         q.set_stress(p, lanes, state.stress);
     }
