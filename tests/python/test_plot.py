@@ -45,6 +45,14 @@ def test_animation(results, tmp_path):
     assert Image.open(tmp_path / "a.gif").n_frames > 1
 
 
+@pytest.mark.parametrize("options, told", [(("--range", "1", "0"), "the lower one first"), (("--range", "nan", "1"), "the lower one first"), (("--range", "1", "1"), "the lower one first"),
+                                           (("--time", "nan"), "--time must be a number"), (("--time", "inf"), "--time must be a number"), (("--seconds", "nan"), "must be positive"),
+                                           (("--field", "banana"), "mpm-linear.h5: snapshot"), (("--profile", "banana"), ".h5: snapshot")])
+def test_what_cannot_be_drawn_is_told(results, tmp_path, options, told):
+    done = plot(results[1], *options, "-o", tmp_path / "a.png")
+    assert done.returncode == 1 and told in done.stderr and "Traceback" not in done.stderr and not (tmp_path / "a.png").exists()
+
+
 @pytest.mark.skipif(not shutil.which("ffmpeg"), reason="ffmpeg is not installed")
 def test_animation_as_mp4(results, tmp_path):
     done = plot(*results, "-o", tmp_path / "a.mp4", "--seconds", "1")

@@ -72,8 +72,21 @@ def test_paper(tmp_path):
 
 
 def test_words_for_latex():
-    assert escape("† ± ² τ") == r"$\dagger$ $\pm$ $^2$ $\tau$" and escape("…") == r"\ldots{}"
+    assert escape("† ‡ ± ² τ") == r"$\dagger$ $\ddagger$ $\pm$ $^2$ $\tau$" and escape("…") == r"\ldots{}"
     assert escape("Müller σ → Δ λ") == r"Müller $\sigma$ ? $\Delta$ $\lambda$"
+
+
+def test_marks_of_a_latex_table_have_a_legend(tmp_path):
+    """A lost run and a suspect one, each with its sign and what it means, and no sign that does not occur."""
+    target = '[[target]]\nlabel = "x"\nquantity = "stress"\nnorm = "l2"\nkind = "order_min"\nvalue = 0\n'
+    doubtful = {"attributes": {"soundness": "suspect", "suspect": "noise: much"}}
+    folder = write_study(tmp_path / "s", target, sizes=(2.0, 1.0, 0.5), metrics="stress", models={"lpfdm": lambda L: L**2, "mpm-linear": lambda L: L},
+                         change=lambda v, L, r: {("lpfdm", 0.5): None, ("mpm-linear", 0.5): doubtful}.get((v, L), {}))
+    build([folder], tmp_path / "out", "c")
+    text = (tmp_path / "out" / "tables" / "report_questions.tex").read_text()
+    rows, legend = text.split(r"\end{tabular}")
+    assert r"* (2 of 3 runs)" in rows and r"$\ddagger$" in rows and "?" not in rows
+    assert "*: some of the runs gave no number" in legend and r"$\ddagger$: some of the runs are suspect" in legend and r"$\dagger$" not in legend
 
 
 def test_two_studies_of_one_name(tmp_path, capsys):
@@ -165,6 +178,16 @@ def test_crate_names_what_is_there(tmp_path):
     assert set(references) <= set(ids)
     assert ids["report.html"]["encodingFormat"] == "text/html"
     assert [ids[m["@id"]]["@type"] for m in root["mentions"]] == ["CreateAction"]
+
+
+def test_crate_has_the_numbers_in_its_words(tmp_path):
+    text = '[[number]]\nname = "e"\nquantity = "stress"\nnorm = "l2"\nwhere = {variant = "lpfdm", L = 1.0}\n'
+    folder = write_study(tmp_path / "s", text, sizes=(2.0, 1.0), metrics="stress")
+    path = folder / "study.toml"
+    path.write_text(path.read_text().replace("Known orders.", "An error of {e} in {{braces}}."))
+    build([folder], tmp_path / "out", "c")
+    graph = json.loads((tmp_path / "out" / "ro-crate-metadata.json").read_text())["@graph"]
+    assert [e["disambiguatingDescription"] for e in graph if "disambiguatingDescription" in e] == ["An error of 0.0200 in {braces}."]
 
 
 FIGURE = '[[figure]]\nkind = "convergence"\nquantity = "stress"\nnorm = "l2"\ncaption = "50 % of a_b & more."\n'

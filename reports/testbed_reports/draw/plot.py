@@ -1,5 +1,6 @@
 """`testbed plot`: pictures of single results, without a study."""
 import argparse
+import math
 import sys
 from pathlib import Path
 
@@ -41,8 +42,12 @@ def _options(arguments):
         parser.error("an animation is of a map")
     if options.all and options.time is not None:
         parser.error("--all and --time exclude each other")
-    if options.seconds <= 0:
+    if not 0 < options.seconds < math.inf:
         parser.error("--seconds must be positive")
+    if options.time is not None and not math.isfinite(options.time):
+        parser.error(f"--time must be a number of seconds, not {options.time:g}")
+    if options.range and not -math.inf < options.range[0] < options.range[1] < math.inf:
+        parser.error("--range needs two numbers, the lower one first")
     return options
 
 

@@ -30,7 +30,7 @@ def as_csv(table):
 _LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_\allowbreak{}", "{": r"\{",
           "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "≤": r"$\le$", "≥": r"$\ge$",
           "−": "$-$", "µ": r"\textmu{}", "×": r"$\times$", "<": r"$<$", ">": r"$>$", "∞": r"$\infty$", "–": "--", "|": r"\textbar{}", "✓": r"$\checkmark$", "°": r"\textdegree{}",
-          "†": r"$\dagger$", "±": r"$\pm$", "²": "$^2$", "τ": r"$\tau$", "√": r"$\surd$", "…": r"\ldots{}"}
+          "†": r"$\dagger$", "‡": r"$\ddagger$", "±": r"$\pm$", "²": "$^2$", "τ": r"$\tau$", "√": r"$\surd$", "…": r"\ldots{}"}
 
 
 def escape(text):
@@ -94,7 +94,7 @@ def _blocks(table, columns):
 
 
 def as_latex(table):
-    """A booktabs table for a line of 174 mm; columns that do not fit follow below, with the words repeated."""
+    """A booktabs table for a line of 174 mm; columns that do not fit follow below, with the words repeated, and then the notes."""
     columns = _columns(table)
     kind = "longtable" if len(table.rows) > ROWS else "tabular"
     lines = [r"% needs \usepackage{array,booktabs,longtable}", r"{\footnotesize"]
@@ -103,4 +103,5 @@ def as_latex(table):
                   " & ".join(escape(table.header[k]) for k in block) + r" \\", r"\midrule"]
         lines += [" & ".join(escape(row[k]) for k in block) + r" \\" for row in table.rows]
         lines += [r"\bottomrule", rf"\end{{{kind}}}", "", r"\medskip"]
-    return "\n".join(lines[:-2] + ["}"]) + "\n"
+    notes = [r"\medskip", r"\parbox{\linewidth}{\raggedright " + " ".join(map(escape, table.notes)) + "}"] if table.notes else []
+    return "\n".join(lines[:-1] + notes + ["}"]) + "\n" if notes else "\n".join(lines[:-2] + ["}"]) + "\n"

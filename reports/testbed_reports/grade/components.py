@@ -57,7 +57,8 @@ def of_snapshot(snapshot, component, exact=False):
     name, part = split(component)
     field = f"exact_{name}" if exact else name
     if field not in snapshot:
-        raise ResultError(f"{snapshot.result.path.parent.name}: snapshot {snapshot.name} lacks the field {field}; it has "
+        path = snapshot.result.path  # that of a run goes by the run's folder
+        raise ResultError(f"{path.parent.name if path.name == 'result.h5' else path}: snapshot {snapshot.name} lacks the field {field}; it has "
                           f"{', '.join(sorted(snapshot.fields))}, and components such as stress_yy, mean_stress, displacement_y")
     values = np.asarray(pick(snapshot[field], name, part))
     if values.ndim > 1:

@@ -5,6 +5,11 @@ from ..draw.table import Table
 from ..grade.numbers import Number, numbers_of
 
 
+def plain(pieces):
+    """Pieces of a text as one string, without their ids."""
+    return "".join(piece if isinstance(piece, str) else piece[1].text for piece in pieces)
+
+
 class Ledger:
     """Takes numbers in as they are shown. `missing`: [study, what, why] of those that a text names and no run gives."""
 

@@ -1,6 +1,7 @@
 """paper.tex: what the report shows, as a skeleton that latexmk turns into a PDF."""
 from ..draw.table import escape
 from ..grade.dataset import write_atomically
+from .ledger import plain
 from .names import slug
 from .page import render
 
@@ -9,7 +10,7 @@ WIDTHS = {"column": "84mm", "page": "174mm"}
 
 def _plain(pieces):
     """Pieces of a text without their ids, for LaTeX."""
-    return escape("".join(piece if isinstance(piece, str) else piece[1].text for piece in pieces))
+    return escape(plain(pieces))
 
 
 def _section(name, section):

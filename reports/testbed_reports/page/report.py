@@ -20,7 +20,7 @@ from ..read.study_file import StudyError
 from . import bench, findings
 from .against import moved_table
 from .crate import write_crate
-from .ledger import Ledger
+from .ledger import Ledger, plain
 from .names import slug, study_anchor
 from .page import both_svgs, render, scripts
 from .paper import write_paper
@@ -254,7 +254,7 @@ def build(folders, out, command, unreadable=None, against=None, pgf=False):
                   failures=Table("failures", "Failures", ["study", "what", "status", "reason"], failures, 4),
                   left_out=Table("left_out", "Left out", ["study", "variant", "combination", "reason"], left_out, 4))
     write_atomically(out / "report.html", page)
-    write_crate(out, title, studies, dict(rows).get("Commit", []))
+    write_crate(out, title, studies, dict(rows).get("Commit", []), {study.name: plain(section["purpose"]) for study, section in zip(studies, sections)})
     return out / "report.html"
 
 

@@ -180,10 +180,15 @@ def targets_table(verdicts):
                  [[v.label, v.asked, v.measured, v.verdict, v.note, v.source] for v in verdicts], 6)
 
 
+SIGNS = {"*": "*: some of the runs gave no number; the number is of so many of them.", "‡": "‡: some of the runs are suspect.", "†": "†: one static solve.",
+         "busy": "busy: measured while others ran."}  # in the matrix of the first screen
+
+
 def questions_table(first):
     """The matrix of the first screen."""
     rows = [[row["text"], *(c["piece"] if isinstance(c["piece"], str) else c["piece"][1].text for c in row["cells"])] for row in first["matrix"]]
-    return Table("questions", "Questions by method", ["question", *first["variants"]], rows)
+    notes = [meaning for sign, meaning in SIGNS.items() if any(sign in cell for row in rows for cell in row[1:])]
+    return Table("questions", "Questions by method", ["question", *first["variants"]], rows, notes=notes)
 
 
 def claims_table(claims):
