@@ -11,6 +11,7 @@ from pathlib import Path
 from ..read.results import Result, ResultError
 from ..read.study_file import StudyError, matches, read_study
 from . import metrics
+from .foreign import faults, outside_name
 from .limits import find_limits
 from .recorded import QUANTITIES, recorded
 from .verdicts import judge_study
@@ -32,6 +33,7 @@ class Run:
     command: str = ""  # that makes it again
     search: str = ""  # what is common to the runs of one bisection
     verdict: object = None  # of a study with cases
+    outside: bool = False  # of another code
 
     @property
     def completed(self):
@@ -136,6 +138,12 @@ def digest(*parts, length=8):
     return sha.hexdigest()[:length]
 
 
+def call_outside(run):
+    """Marks a run as one of another code, with a name that no run of the testbed has."""
+    run.outside = True
+    run.values |= {key: outside_name(run.values[key]) for key in ("method", "variant")}
+
+
 def read_run(folder, entry, file="result.h5"):
     """A run from its folder; never raises for a bad file, but says so in `reason`."""
     folder = Path(folder)
@@ -160,6 +168,8 @@ def read_run(folder, entry, file="result.h5"):
         run.status, run.reason = "unreadable", f"{file} is of another scene than the plan says: run the study once more"
         return run
     run.result, run.status, run.reason = result, result.status, result.reason
+    if not result.own:
+        call_outside(run)
     grades = metrics.grade(result)
     run.rows, run.errors = grades.rows, grades.errors
     return run
@@ -199,13 +209,26 @@ def read_plan(folder):
     return {"runs": [{"id": name} for name in runs], "left_out": []}
 
 
+def _read_outside(folder, name, own):
+    """The run of a result that no plan has made; unreadable where it cannot be what it says."""
+    run = read_run(folder, {"id": name})
+    if run.result is None:
+        return run
+    wrong = faults(run.result, [r.result for r in own if r.result is not None])
+    if wrong:
+        return Run(name, folder, run.values, "unreadable", "; ".join(wrong), outside=True)
+    if not run.outside:
+        call_outside(run)
+    return run
+
+
 def read_study_folder(folder):
     """A study's folder, graded. Raises StudyError when the study file or the plan is unusable."""
     folder = Path(folder)
     spec, plan = read_study(folder / "study.toml", need_scene=False), read_plan(folder)
-    outside = [{"id": name} for name in outside_runs(folder, plan)]
-    runs = [read_run(folder / "runs" / entry["id"], entry) for entry in plan.get("runs", []) + outside]
-    study = Study(folder, spec, plan, runs, plan.get("left_out", []), [entry["id"] for entry in outside])
+    runs, outside = [read_run(folder / "runs" / entry["id"], entry) for entry in plan.get("runs", [])], outside_runs(folder, plan)
+    runs += [_read_outside(folder / "runs" / name, name, runs) for name in outside]
+    study = Study(folder, spec, plan, runs, plan.get("left_out", []), [run.id for run in runs if run.outside and run.result is not None])
     if spec.cases:
         judge_study(study)
         study.limits = find_limits(study)

@@ -3,6 +3,7 @@ from pathlib import Path
 
 from ..read.study_file import StudyError, StudyFile
 from .dataset import Study, read_run
+from .foreign import faults
 
 TOLD = ("variant", "case", "L")  # what tells results apart in a picture, as far as it differs
 
@@ -43,6 +44,9 @@ def study_of(paths, title="Results", figures=figures_of):
     for run, path in zip(runs, paths):
         if run.result is None:
             raise StudyError(f"{path}: {run.reason}" if path.is_file() else f"{path}: no such file")
+    for run in runs:
+        if not run.result.own:
+            run.errors += faults(run.result)
     for run, label in zip(runs, _labels(runs, paths)):
         run.values["variant"] = label
     whole = [{"where": {}, "series": ["variant"], "unfinished": True, **figure} for figure in figures(runs[0].result)]

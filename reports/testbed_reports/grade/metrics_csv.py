@@ -27,7 +27,7 @@ def metrics_csv(runs):
         if run.result is None or not run.result.finished:
             continue
         performance = run.result.performance
-        own = [run.id, run.values["case"], run.result.method, run.result.variant, _number(run.values["L"]), run.values["ppc"],
+        own = [run.id, run.values["case"], *((run.values["method"], run.values["variant"]) if run.outside else (run.result.method, run.result.variant)), _number(run.values["L"]), run.values["ppc"],
                _number(run.values["dt"]), run.values["seed"], *(run.values.get(key, "") for key in axes)]
         last = [_number(performance.get("solve_s", "")), _count(performance.get("particle_steps", "")), run.status, run.result.soundness,
                 run.result.cause, run.result.remedy]

@@ -8,7 +8,7 @@ LIST = Path(__file__).with_name("references.bib")
 def used(run):
     """What a run uses, in the keywords of the list: method, variant, options of it, case, local damping, nonlocal softening."""
     scene = run.result.resolved
-    words = {run.result.method, run.name.split("[")[0], str(run.values.get("case", "")), *re.findall(r"[\[,]\s*\w+\s*=\s*(\w+)", run.name)}
+    words = {"" if run.outside else run.result.method, run.name.split("[")[0], str(run.values.get("case", "")), *re.findall(r"[\[,]\s*\w+\s*=\s*(\w+)", run.name)}
     if isinstance(scene.get("damping"), dict) and scene["damping"].get("local"):
         words.add("local damping")
     softening = [m.get("softening") for m in scene.get("material", []) if isinstance(m.get("softening"), dict)]

@@ -65,6 +65,11 @@ def _forget_others(key):
         _copies.clear()
 
 
+def has_checksum(path):
+    """Whether a file is as a program of the testbed wrote it. Raises DamagedError when it was changed since."""
+    return _has_good_checksum(Path(path), Path(path).stat().st_size)
+
+
 def _has_good_checksum(path, size):
     """Whether a file ends with its checksum. Raises DamagedError when with another one."""
     status = path.stat()

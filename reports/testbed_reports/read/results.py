@@ -6,10 +6,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .guarded import DamagedError, open_file, plain
+from .guarded import DamagedError, has_checksum, open_file, plain
 
 FINISHED = ("completed", "diverged", "time_limit")
 STATUSES = FINISHED + ("interrupted",)
+SECONDS = ("setup_s", "solve_s", "forcing_s", "output_s", "guards_s")
 FORMAT, VERSION = "testbed-result", 1
 
 # Columns of a symmetric tensor in a file: the order of XDMF's Tensor6.
@@ -66,13 +67,14 @@ class Snapshot:
 class Result:
     """One result file. Attributes are read at once, arrays when asked for.
 
-    `root`, `scene`, `provenance`, `performance`: attributes as dictionaries; `phases`: seconds by phase name;
+    `own`: whether the testbed wrote it. `root`, `scene`, `provenance`, `performance`: attributes as dictionaries; `phases`: seconds by phase name;
     `materials`: attributes by material name; `resolved`: the resolved scene, parsed; `snapshots`: by rising number.
     """
 
     def __init__(self, path):
         self.path = Path(path)
         try:
+            self.own = has_checksum(self.path)
             with open_file(self.path) as file:
                 self.root = _attributes(file)
                 if self.root.get("format") != FORMAT:
@@ -117,6 +119,12 @@ class Result:
             for name, value in attributes.items():
                 if not _is_number(value):
                     raise ResultError(f"{self.path}: the attribute '{name}' of /{group} is no number")
+        for name in () if self.own else SECONDS:
+            if not self.performance.get(name, 0) >= 0:
+                raise ResultError(f"{self.path}: the attribute '{name}' of /performance is {self.performance[name]:g}: no seconds")
+        threads = self.provenance.get("threads", 1)
+        if not _is_number(threads) or not 1 <= threads < math.inf:
+            raise ResultError(f"{self.path}: the attribute 'threads' of /provenance is {threads!r}")
         for snapshot in self.snapshots:
             if not _is_number(snapshot.time) or not math.isfinite(snapshot.time):
                 raise ResultError(f"{self.path}: snapshot {snapshot.name} has no time")

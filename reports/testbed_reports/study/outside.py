@@ -1,5 +1,6 @@
 """`testbed import`: whether a result of another code can be used, what it lacks, and into which study it goes."""
 import argparse
+import contextlib
 import re
 import shutil
 import sys
@@ -8,9 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from ..grade import metrics
-from ..grade.dataset import OWN_RUN
+from ..grade.dataset import OWN_RUN, read_plan
+from ..grade.foreign import faults, outside_name
 from ..grade.scene_words import misnamed
 from ..read.results import Result, ResultError
+from ..read.study_file import StudyError
 
 # What a report shows of a run, beside its metrics: attributes or fields, and what goes without them.
 WANTED = {"performance": {"solve_s": "error against run time", "particle_steps_per_second": "the table of performance", "bytes_per_point": "the table of performance",
@@ -35,32 +38,30 @@ def _lacks(result):
     return told
 
 
-def _shapes(result):
-    """Sentences on arrays whose sizes or values cannot be."""
-    told, sizes = [], {}
-    for name in sorted(result.final.fields) if result.snapshots else []:
-        values = result.final[name]
-        if not values.ndim:
-            told.append(f"the last snapshot's {name} is a single number, not one for each point")
-            continue
-        sizes.setdefault(len(values), []).append(name)
-        if not np.isfinite(values).all():
-            told.append(f"the last snapshot's {name} is not finite everywhere")
-    if len(sizes) > 1:
-        told.append("fields of the last snapshot differ in their number of points: " + "; ".join(f"{', '.join(names)}: {n}" for n, names in sizes.items()))
-    return told
+def _own_results(folder, like):
+    """Results of the study's plan with the case and the cell size of another one."""
+    for entry in read_plan(folder).get("runs", []):
+        path = folder / "runs" / entry["id"] / "result.h5"
+        if path.is_file() and entry.get("L") in (None, like.cell_size):
+            with contextlib.suppress(ResultError):  # of a damaged one the report tells
+                yield Result(path)
 
 
-def examine(path):
-    """(what it is, wrong, lacking): wrong sentences keep it from being used. Raises ResultError."""
+def examine(path, study=None):
+    """(what it is, wrong, lacking): wrong sentences keep it from being used. `study`: the folder that it is for. Raises ResultError."""
     result = Result(path)
     what = f"{result.variant} on {result.case}, {result.status}, L = {result.cell_size:g} m, {len(result.snapshots)} snapshots"
     grades = metrics.grade(result)
     numbers = [" ".join(key).strip() for key, value in grades.rows.items() if key[0] not in metrics.ALWAYS and np.isfinite(value)]
     what += f"; graded: {', '.join(numbers)}" if numbers else "; nothing graded"
+    if outside_name(result.variant) != result.variant:
+        what += f"; beside runs of a study it is called '{outside_name(result.variant)}'"
     missing = [f"not graded: {error}" for error in grades.errors if "/performance" not in error and "unknown metric" not in error]
     missing += [text for part in misnamed(result.metrics, result.resolved.get("report", {}).get("reference", {}), []) for text in part]
-    return what, _shapes(result), _lacks(result) + missing
+    cases = {entry.get("case", result.case) for entry in read_plan(study)["runs"]} if study else set()
+    if cases and result.case not in cases:
+        missing.append(f"the study has no case '{result.case}' (it has {', '.join(sorted(cases))}): nothing to compare it with")
+    return what, faults(result, _own_results(study, result) if study else ()), _lacks(result) + missing
 
 
 def main(arguments=None):
@@ -75,16 +76,16 @@ def main(arguments=None):
         return 1 if stop.code else 0
     name = options.name or Path(options.result).stem
     try:
-        what, wrong, lacking = examine(options.result)
+        folder = Path(options.study) if options.study else None
+        if folder and not (folder / "study.toml").is_file():
+            raise ResultError(f"{folder}: no folder of a study (no study.toml)")
+        what, wrong, lacking = examine(options.result, folder)
         print(f"{options.result}: {what}")
         for sentence in lacking:
             print(f"  lacks: {sentence}")
         if wrong:
             raise ResultError("\n".join(wrong))
-        if options.study:
-            folder = Path(options.study)
-            if not (folder / "study.toml").is_file():
-                raise ResultError(f"{folder}: no folder of a study (no study.toml)")
+        if folder:
             if OWN_RUN.search(name[-14:]) or not re.fullmatch(r"[\w+=-][\w.+=-]*", name):
                 raise ResultError(f"--name {name}: must be letters, digits and . _ + = -, and not end as those of the study's own runs")
             home = folder / "runs" / name
@@ -93,7 +94,7 @@ def main(arguments=None):
             home.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(options.result, home / "result.h5")
             print(f"{home / 'result.h5'}")
-    except (ResultError, OSError) as error:
+    except (ResultError, StudyError, OSError) as error:
         print(f"testbed import: {error}", file=sys.stderr)
         return 1
     return 0
