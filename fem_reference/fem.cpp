@@ -289,7 +289,7 @@ std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
     // the triangular solves are serial and dominate; threads in deal.II would only change the order of sums
     dealii::MultithreadInfo::set_thread_limit(1);
     const Warn say = warn ? warn : [](const std::string& message) { fmt::print(stderr, "warning: {}\n", message); };
-    const bool damped = scene.damping && scene.damping->local > 0;
+    const bool damped = scene.damping && scene.damping->acts();
     const bool ramped = scene.gravity && scene.gravity->ramp > 0;
     const bool moving = std::any_of(scene.walls.begin(), scene.walls.end(), [](const WallSpec& wall) { return wall.velocity.has_value(); });
     using Analysis = FemSpec::Analysis;

@@ -70,7 +70,7 @@ void warn(const Scene& scene, Problems& problems)
                       "domains reach into the cells outside a loaded face, and what they hold there may run away; use [confinement] "
                       "for a pressure, or lpfdm.support = \"point\"");
     if (scene.options<LpfdmSpec>().cells == Cells::triangles && scene.options<LpfdmSpec>().shake == 0 &&
-        !(scene.damping && scene.damping->local > 0))
+        !(scene.damping && scene.damping->acts()))
         problems.warn("lpfdm.cells", "points of a body whose faces lie on lines of the lattice lie on the diagonals, too, and change "
                                      "triangles in the smallest motion, which "
                                      "makes energy without damping: shift the body by a part of their distance, or use lpfdm.shake");

@@ -43,6 +43,8 @@ void check(const Scene& scene, Problems& problems)
         problems.add("mpm.xpic_order", fmt::format("must lie in [1, 20], not {}", mpm.xpic_order));
     if (mpm.transfer == MpmSpec::Transfer::xpic && mpm.flip != 1)
         problems.add("mpm.flip", "blends FLIP with PIC; transfer = \"xpic\" has no use for it");
+    if (mpm.transfer == MpmSpec::Transfer::xpic && scene.damping && scene.damping->kinetic)
+        problems.add("damping.kinetic", "stops points that transfer = \"xpic\" filters; damping.local goes with it");
     if (mpm.null_space_filter != MpmSpec::Filter::none && mpm.shape != Shape::linear)
         problems.add("mpm.null_space_filter", "works cell by cell and needs shape = \"linear\"; for wider shapes take transfer = \"xpic\"");
     if (!(mpm.mass_cutoff >= 0 && mpm.mass_cutoff <= 0.25))

@@ -242,9 +242,11 @@ private:
     /// v += F / m dt; from here on the force holds the increment of the velocity.
     void accelerate_and_keep_increment(double dt)
     {
-        node_ops_.kick(nodes_, dt);
+        const bool stopped = node_ops_.kick(nodes_, dt);
         node_ops_.restrain(grid_.lattice, nodes_, nodes_.v);
-        if (node_ops_.restrains())
+        if (stopped)
+            stop_points();
+        else if (node_ops_.restrains())
             nodes_.for_each(
                 [&](std::size_t i, const auto& lanes)
                 { unrolled<2>([&](auto d) { lanes.store(&nodes_.f[d][i], lanes.load(&nodes_.v[d][i]) - lanes.load(&mapped_[d][i])); }); });
@@ -257,6 +259,14 @@ private:
                 });
         grid_.extend(nodes_.v);
         grid_.extend(nodes_.f);
+    }
+    /// The nodes have been: the increment is all their velocity.
+    void stop_points()
+    {
+        for (Body& body : bodies_)
+            for (auto& component : body.points.v)
+                std::fill_n(component.data(), body.points.count, 0.0);
+        nodes_.f = nodes_.v;
     }
 
     void update_velocity(bool remap)

@@ -64,8 +64,10 @@ std::string fields_and_modules(const Scene& scene, Solver& solver)
             });
     if (scene.gravity)
         modules.emplace_back("gravity");
-    if (scene.damping)
+    if (scene.damping && scene.damping->local > 0)
         modules.emplace_back("local damping");
+    if (scene.damping && scene.damping->kinetic)
+        modules.emplace_back("kinetic damping");
     if (!scene.boundaries.empty())
         modules.push_back(fmt::format("{} fixities", scene.boundaries.size()));
     if (!scene.walls.empty())

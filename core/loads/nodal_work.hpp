@@ -13,7 +13,7 @@ struct NodalWork
     double gravity = 0;     ///< on the nodes' masses
     double restraints = 0;  ///< of supports and walls on the soil
     double loads = 0;       ///< of tractions and body forces
-    double damping = 0;     ///< taken away by local damping
+    double damping = 0;     ///< taken away by damping
     double hourglass = 0;   ///< taken away by hourglass control
     bool of_strain = true;  ///< strain is that of the velocities before and after the kicks, so that internal() is the stresses' work
 

@@ -172,8 +172,10 @@ public:
     }
     /// Power that hourglass control takes from the motion in the coming kick [W/m].
     void note_hourglass(double power) { power_.hourglass = power; }
-    /// Accelerates, and adds up the work of all forces.
-    void kick(Nodes<2>& nodes, double dt);
+    /// Accelerates, and adds up the work of all forces. Kinetic damping then stops the nodes if that took kinetic energy from them: the
+    /// peak, at which the slowest mode passes its equilibrium, is behind them (Cundall 1976; Barnes 1999, Int. J. Space Struct. 14).
+    /// Returns whether it did.
+    bool kick(Nodes<2>& nodes, double dt);
     /// Work up to the time of the forces, `lag` seconds after that of the nodes' velocity.
     NodalWork work(const Nodes<2>& nodes, double lag) const;
     /// The sums up to the last kick, on which no step depends.
@@ -199,6 +201,8 @@ private:
     /// Power of the loads at the present velocity [W/m].
     double load_power(const Nodes<2>& nodes) const;
     void add_work(const Kick& kick, double loads, double dt, NodalWork& work) const;
+    /// Puts the nodes at rest in the middle of the kick that they have taken, so that its second half alone moves them.
+    void stop(Nodes<2>& nodes, double dt);
     void find_driven(const Lattice<2>& lattice, const Nodes<2>& nodes)
     {
         if (nodes.version() == seen_)
@@ -210,6 +214,7 @@ private:
     std::optional<Gravity> gravity_;
     const std::vector<double>* weight_ = nullptr;  ///< null: all mass has weight
     std::optional<LocalDamping> damping_;
+    bool has_kinetic_damping_ = false;
     std::vector<Restraint> restraints_;  ///< of the boundaries, then of the walls: where two prescribe, the later one does
     std::vector<Wall> walls_;
     std::size_t first_wall_ = 0;

@@ -177,7 +177,7 @@ std::vector<std::unique_ptr<Guard>> balance_guards(const Scene& scene)
     std::vector<std::unique_ptr<Guard>> guards;
     const bool is_loaded = !scene.tractions.empty() || scene.body_force || scene.confinement;
     const bool is_held = !scene.boundaries.empty() || !scene.walls.empty();
-    const bool is_damped = scene.damping && scene.damping->local > 0;
+    const bool is_damped = scene.damping && scene.damping->acts();
     guards.push_back(std::make_unique<EnergyGuard>());
     if (!is_damped && !scene.may_flow() && traits_of(scene).has_points)
         guards.push_back(std::make_unique<LossGuard>());

@@ -183,7 +183,7 @@ private:
 bool is_to_rest(const Scene& scene)
 {
     const bool moving = std::any_of(scene.walls.begin(), scene.walls.end(), [](const WallSpec& w) { return w.velocity.has_value(); });
-    const bool damped = scene.damping && scene.damping->local > 0;
+    const bool damped = scene.damping && scene.damping->acts();
     const bool ramped = scene.gravity && scene.gravity->ramp > 0 && scene.gravity->ramp < scene.time.end;
     return scene.time.stop_unbalanced || (!scene.may_flow() && damped && ramped && !moving);
 }

@@ -201,7 +201,7 @@ std::vector<std::unique_ptr<Guard>> motion_guards(const Scene& scene)
     std::vector<std::unique_ptr<Guard>> guards;
     const bool is_loaded = !scene.tractions.empty() || scene.body_force || scene.confinement;
     const bool is_held = !scene.boundaries.empty() || !scene.walls.empty();
-    const bool is_damped = scene.damping && scene.damping->local > 0;
+    const bool is_damped = scene.damping && scene.damping->acts();
     if (!is_loaded && is_held && !is_damped && !scene.may_flow() && scene.walls.empty() && scene.gravity &&
         std::hypot(scene.gravity->acceleration[0], scene.gravity->acceleration[1]) > 0)
         guards.push_back(std::make_unique<DriftGuard>(*scene.gravity));

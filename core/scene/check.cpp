@@ -38,7 +38,7 @@ void check_grid(const GridSpec& grid, const SceneBounds& bounds, Problems& probl
 /// Masses may be raised only where the way to rest does not matter.
 void check_density_scaling(const Scene& scene, Problems& problems)
 {
-    if (!scene.damping || scene.damping->local <= 0)
+    if (!scene.damping || !scene.damping->acts())
         problems.add("time.density_scaling", "changes every motion: it is for scenes on their way to rest and needs [damping]");
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
         if (scene.bodies[k].velocity)
@@ -57,14 +57,39 @@ void check_time(const Scene& scene, Problems& problems)
     check_positive(scene.time.wall_clock_limit, "time.wall_clock_limit", problems);
 }
 
+/// Stopping is lawful where only rest is asked for, and nothing keeps anything in motion.
+void check_kinetic_damping(const Scene& scene, Problems& problems)
+{
+    const auto refuse = [&](const std::string& key, const char* why)
+    {
+        problems.add(
+            key, fmt::format("{} and damping.kinetic, which stops all that moves, exclude each other; damping.local goes with it", why));
+    };
+    for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+        if (scene.bodies[k].velocity)
+            refuse(fmt::format("body[{}].velocity", k), "an initial velocity");
+    for (std::size_t k = 0; k < scene.walls.size(); ++k)
+        if (scene.walls[k].velocity)
+            refuse(fmt::format("wall[{}].velocity", k), "a moving wall");
+}
+
+void check_damping(const Scene& scene, Problems& problems)
+{
+    if (!scene.damping)
+        return;
+    if (!(scene.damping->local >= 0 && scene.damping->local < 1))
+        problems.add("damping.local", fmt::format("must lie in [0, 1), not {}", scene.damping->local));
+    if (scene.damping->kinetic)
+        check_kinetic_damping(scene, problems);
+}
+
 void check_loads(const Scene& scene, Problems& problems)
 {
     if (scene.gravity && scene.gravity->ramp < 0)
         problems.add("gravity.ramp", "must not be negative");
     if (scene.confinement && !(scene.confinement->pressure >= 0))
         problems.add("confinement.pressure", fmt::format("must not be negative, not {}", scene.confinement->pressure));
-    if (scene.damping && !(scene.damping->local >= 0 && scene.damping->local < 1))
-        problems.add("damping.local", fmt::format("must lie in [0, 1), not {}", scene.damping->local));
+    check_damping(scene, problems);
 }
 
 void check_traction(const Scene& scene, const TractionSpec& traction, const std::string& key, Problems& problems)

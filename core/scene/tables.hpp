@@ -113,11 +113,16 @@ struct GravitySpec
 struct DampingSpec
 {
     double local = 0;
+    bool kinetic = false;
+
+    bool acts() const { return local > 0 || kinetic; }
 
     template <class V>
     void describe(V& v)
     {
-        v.required("local", local, "-", "alpha of local non-viscous damping, eqs. (14)-(15), in [0, 1)");
+        v.optional("local", local, "-", "alpha of local non-viscous damping, eqs. (14)-(15), in [0, 1)");
+        v.optional("kinetic", kinetic, "-",
+                   "for elastic bodies on their way to rest: all that moves is stopped whenever the kinetic energy begins to fall");
     }
 };
 
