@@ -299,7 +299,7 @@ std::unique_ptr<Solver> make_fem(const Scene& scene, const Warn& warn)
     if (moving)
         throw SceneError(fmt::format("{}: walls move only in fem.analysis = \"static\" (the state at time.end)", scene.path));
     if (damped)
-        throw SceneError(fmt::format("{}: fem.analysis = \"dynamic\" has no local damping; take the damping out (--set damping.local=0), "
+        throw SceneError(fmt::format("{}: fem.analysis = \"dynamic\" takes no damping; leave [damping] out (--set damping.local=0), "
                                      "or set fem.analysis = \"static\" for the state at rest",
                                      scene.path));
     switch (scene.options<FemSpec>().integrator)

@@ -242,10 +242,10 @@ private:
     /// v += F / m dt; from here on the force holds the increment of the velocity.
     void accelerate_and_keep_increment(double dt)
     {
-        const bool stopped = node_ops_.kick(nodes_, dt);
+        const std::optional<double> stopped = node_ops_.kick(nodes_, dt);
         node_ops_.restrain(grid_.lattice, nodes_, nodes_.v);
         if (stopped)
-            stop_points();
+            stop_points(*stopped);
         else if (node_ops_.restrains())
             nodes_.for_each(
                 [&](std::size_t i, const auto& lanes)
@@ -260,9 +260,10 @@ private:
         grid_.extend(nodes_.v);
         grid_.extend(nodes_.f);
     }
-    /// The nodes have been: the increment is all their velocity.
-    void stop_points()
+    /// The nodes have been: the increment is all their velocity. @param energy that they had, which is a part of the points' [J/m]
+    void stop_points(double energy)
     {
+        node_ops_.work_done().note_stopped(point_motion().kinetic_energy - energy);
         for (Body& body : bodies_)
             for (auto& component : body.points.v)
                 std::fill_n(component.data(), body.points.count, 0.0);

@@ -158,6 +158,19 @@ TEST(Ledger, KnowsWhatDampingTakes)
     }
 }
 
+/// So it is where the motion is stopped at the peaks of its energy.
+TEST(Ledger, KnowsWhatKineticDampingTakes)
+{
+    for (const std::string& method : all_methods)
+    {
+        const Watched w = watch(block(floor_y + sides + gravity + "[damping]\nkinetic = true\n", 0, 3), method, {"time.cfl=0.2"});
+        EXPECT_NEAR(w.end().damping / w.end().external, 0.5, 0.02) << method;
+        EXPECT_LT(w.end().kinetic, 1e-6 * w.end().elastic) << method;
+        EXPECT_LT(w.unexplained(), closes(method)) << method;
+        EXPECT_EQ(w.codes(), "") << method;
+    }
+}
+
 /// The pattern without strain is all of the motion; hourglass control takes it away.
 TEST(Ledger, KnowsWhatHourglassControlTakes)
 {

@@ -75,6 +75,47 @@ TEST(LocalDamping, KnowsWhatItTook)
         }
 }
 
+/// A node on a spring under its weight: where the kinetic energy begins to fall it is put at rest in the middle of the kick, so that half
+/// of the kick moves it; the work of the forces is that of the half steps before and after, and what was lost is all that moved.
+TEST(KineticDamping, StopsANodeBehindItsPeak)
+{
+    const std::string text = test::soil_block({0, 0}, {1, 1}) + "[damping]\nkinetic = true\n";
+    const Scene scene = test::load(text, "lpfdm");
+    NodeOps ops(scene, make_lattice(scene.grid));
+    Nodes<2> nodes(2);
+    nodes.set_active({0});
+    nodes.mass = {2, 5};
+    nodes.v[0] = {0, 0};
+    const double stiffness = 30, weight = 12, dt = 0.1;
+    double x = 0, way = 0, v_before = 0;
+    int steps = 0;
+    for (bool stopped = false; !stopped; ++steps, x += dt * nodes.v[0][0])
+    {
+        nodes.f[0] = {weight - stiffness * x, 0};
+        v_before = nodes.v[0][0];
+        const double kicked = v_before + dt * nodes.f[0][0] / 2;
+        stopped = ops.kick(nodes, dt).has_value();
+        EXPECT_EQ(stopped, kicked * kicked < v_before * v_before) << steps;
+        EXPECT_DOUBLE_EQ(nodes.v[0][0], stopped ? 0.5 * dt * nodes.f[0][0] / 2 : kicked);
+        way += 0.5 * dt * nodes.f[0][0] * (v_before + nodes.v[0][0]);
+    }
+    EXPECT_GT(steps, 3);
+    const double energy = nodes.v[0][0] * nodes.v[0][0];  // half of a mass of 2
+    const NodalWork& work = ops.work_done();
+    EXPECT_NEAR(work.kick, energy, 1e-12);  // it started from rest
+    EXPECT_NEAR(work.kick + work.damping, way, 1e-12);
+    EXPECT_GT(work.damping, 0.9 * v_before * v_before);
+}
+
+TEST(KineticDamping, IsForWhatComesToRest)
+{
+    const std::string scene = test::soil_block({0, 0}, {1, 1}) + "[damping]\nkinetic = true\n";
+    test::expect_problem(scene, {"body.soil.velocity=[\"1\", \"0\"]"}, "an initial velocity");
+    test::expect_problem(scene + "[[wall]]\nname = \"lid\"\nmin = [0.0, 1.0]\nmax = [1.0, 1.5]\nvelocity = [\"0\", \"-1\"]\nfix = \"y\"\n",
+                         {}, "a moving wall");
+    test::expect_problem(scene, {"method=mpm-linear", "mpm.transfer=xpic"}, "xpic");
+}
+
 TEST(Accelerate, ByForceOverMass)
 {
     Nodes<2> nodes = two_nodes();

@@ -28,6 +28,12 @@ struct NodalWork
         a.value("hourglass", "J/m", hourglass);
     }
 
+    /// Motion that kinetic damping took, which no force did [J/m].
+    void note_stopped(double energy)
+    {
+        damping += energy;
+        kick -= energy;
+    }
     /// Work done against the stresses: what the other forces do not give to the motion.
     double internal() const { return gravity + restraints + loads - damping - hourglass - kick; }
 };
@@ -63,6 +69,18 @@ std::array<double, K> sum_over_nodes(const Nodes<dim>& nodes, Term&& term)
             return s;
         },
         4);
+}
+
+/// Kinetic energy of the nodes [J/m].
+template <int dim>
+double kinetic_energy(const Nodes<dim>& nodes)
+{
+    const auto energy = [&](std::size_t i, const auto& lanes)
+    {
+        const auto v = load(nodes.v, i, lanes);
+        return std::array{Pack(0.5) * lanes.load(&nodes.mass[i]) * total<dim>([&](auto d) { return v[d] * v[d]; })};
+    };
+    return sum_over_nodes<1>(nodes, energy)[0];
 }
 
 /// Power of the nodal forces at the velocity before the kick [W/m].

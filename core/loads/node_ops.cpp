@@ -110,30 +110,22 @@ void NodeOps::add_work(const Kick& kick, double loads, double dt, NodalWork& wor
     work.hourglass += power_.hourglass * dt;
 }
 
-bool NodeOps::kick(Nodes<2>& nodes, double dt)
+std::optional<double> NodeOps::kick(Nodes<2>& nodes, double dt)
 {
     const double before = is_loaded_ ? load_power(nodes) : 0;
     const Kick kick = damping_ ? accelerate(nodes, weight_of(nodes), dt, *damping_) : accelerate(nodes, weight_of(nodes), dt);
     add_work(kick, is_loaded_ ? 0.5 * (before + load_power(nodes)) : 0, dt, work_);
     if (!has_kinetic_damping_ || kick.work >= 0)
-        return false;
-    stop(nodes, dt);
-    return true;
+        return {};
+    const double energy = kinetic_energy(nodes);
+    stop(nodes, dt, energy);
+    return energy - kick.work;
 }
 
-void NodeOps::stop(Nodes<2>& nodes, double dt)
+void NodeOps::stop(Nodes<2>& nodes, double dt, double energy)
 {
-    const auto energy = [&]
-    {
-        const auto term = [&](std::size_t i, const auto& lanes)
-        {
-            const auto v = load(nodes.v, i, lanes);
-            return std::array{Pack(0.5) * lanes.load(&nodes.mass[i]) * total<2>([&](auto d) { return v[d] * v[d]; })};
-        };
-        return sum_over_nodes<1>(nodes, term)[0];
-    };
     const auto second_half = [&] { return 0.5 * dt * nodal_power(nodes); };
-    double lost = energy() - second_half();
+    const double kept = energy - second_half();
     work_ = work(nodes, -0.5 * dt);
     nodes.for_each(
         [&](std::size_t i, const auto& lanes)
@@ -141,10 +133,8 @@ void NodeOps::stop(Nodes<2>& nodes, double dt)
             const Pack half = inverse_mass(nodes, i, lanes) * Pack(0.5 * dt);
             unrolled<2>([&](auto d) { lanes.store(&nodes.v[d][i], half * lanes.load(&nodes.f[d][i])); });
         });
-    lost += second_half() - energy();
     work_ = work(nodes, 0.5 * dt);
-    work_.damping += lost;
-    work_.kick -= lost;
+    work_.note_stopped(kept + second_half() - kinetic_energy(nodes));
 }
 
 NodalWork NodeOps::work(const Nodes<2>& nodes, double lag) const

@@ -174,8 +174,8 @@ public:
     void note_hourglass(double power) { power_.hourglass = power; }
     /// Accelerates, and adds up the work of all forces. Kinetic damping then stops the nodes if that took kinetic energy from them: the
     /// peak, at which the slowest mode passes its equilibrium, is behind them (Cundall 1976; Barnes 1999, Int. J. Space Struct. 14).
-    /// Returns whether it did.
-    bool kick(Nodes<2>& nodes, double dt);
+    /// Returns the energy that they had before, if it did [J/m].
+    std::optional<double> kick(Nodes<2>& nodes, double dt);
     /// Work up to the time of the forces, `lag` seconds after that of the nodes' velocity.
     NodalWork work(const Nodes<2>& nodes, double lag) const;
     /// The sums up to the last kick, on which no step depends.
@@ -202,7 +202,8 @@ private:
     double load_power(const Nodes<2>& nodes) const;
     void add_work(const Kick& kick, double loads, double dt, NodalWork& work) const;
     /// Puts the nodes at rest in the middle of the kick that they have taken, so that its second half alone moves them.
-    void stop(Nodes<2>& nodes, double dt);
+    /// @param energy kinetic, that they have now [J/m]
+    void stop(Nodes<2>& nodes, double dt, double energy);
     void find_driven(const Lattice<2>& lattice, const Nodes<2>& nodes)
     {
         if (nodes.version() == seen_)

@@ -1,7 +1,9 @@
 """Result files of soil tests with known answers: lattices of points with given fields, supports and reference curves."""
+from pathlib import Path
+
 import h5py
 import numpy as np
-from synthetic import write_result
+from synthetic import seal, write_result
 
 UNITS = {"plastic_shear_strain": "-", "cohesion": "Pa", "friction_angle": "rad", "body": ""}
 CONSTANT = ("cohesion", "friction_angle")  # written once
@@ -28,9 +30,9 @@ def write_soil(path, X, h, fields=None, displacement=None, time=(0.0, 1.0), hist
     `fields`, `displacement` (N, 3): at the last snapshot, growing in equal parts; `supports`: {name: {field: (M, 3)}};
     `probes`: {name: displacement (M, 3)}; `history`: {name: (M,)}; the rest goes to write_result.
     """
-    time = np.asarray(time, float)
+    path, time = Path(path), np.asarray(time, float)
     common = {"metrics": "", "L": 2 * h, **common, "probes": (), "snapshots": 0, "samples": len(time)}
-    write_result(path, **common, history={"time": time, **(history or {})})
+    write_result(path, **common, sealed=False, history={"time": time, **(history or {})})
     u, fields = np.zeros_like(X) if displacement is None else displacement, fields or {}
     with h5py.File(path, "a") as file:
         for name, values in (supports or {}).items():
@@ -53,7 +55,7 @@ def write_soil(path, X, h, fields=None, displacement=None, time=(0.0, 1.0), hist
                     continue
                 group[name] = fields[name] if constant else share * fields[name]
                 group[name].attrs["unit"] = UNITS.get(name, "Pa")
-    return path
+    return seal(path)
 
 
 def vectors(x=0.0, y=0.0):
