@@ -85,6 +85,7 @@ def test_marks_of_a_latex_table_have_a_legend(tmp_path):
     build([folder], tmp_path / "out", "c")
     text = (tmp_path / "out" / "tables" / "report_questions.tex").read_text()
     rows, legend = text.split(r"\end{tabular}")
+    assert r"\noindent\parbox" in legend  # an indent would leave the line
     assert r"* (2 of 3 runs)" in rows and r"$\ddagger$" in rows and "?" not in rows
     assert "*: some of the runs gave no number" in legend and r"$\ddagger$: some of the runs are suspect" in legend and r"$\dagger$" not in legend
 

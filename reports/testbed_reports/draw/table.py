@@ -103,5 +103,5 @@ def as_latex(table):
                   " & ".join(escape(table.header[k]) for k in block) + r" \\", r"\midrule"]
         lines += [" & ".join(escape(row[k]) for k in block) + r" \\" for row in table.rows]
         lines += [r"\bottomrule", rf"\end{{{kind}}}", "", r"\medskip"]
-    notes = [r"\medskip", r"\parbox{\linewidth}{\raggedright " + " ".join(map(escape, table.notes)) + "}"] if table.notes else []
+    notes = [r"\medskip", r"\noindent\parbox{\linewidth}{\raggedright " + " ".join(map(escape, table.notes)) + "}"] if table.notes else []
     return "\n".join(lines[:-1] + notes + ["}"]) + "\n" if notes else "\n".join(lines[:-2] + ["}"]) + "\n"
