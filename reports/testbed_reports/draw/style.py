@@ -39,6 +39,7 @@ class Style:
         self.slots = {label: KNOWN.index(label) for label in self.labels if label in KNOWN}
         free = (k for k in itertools.count() if k not in set(self.slots.values()))
         self.slots.update({label: k for label, k in zip((v for v in self.labels if v not in KNOWN), free)})
+        self.kinds = {}  # of a variant: its labels with further settings, in the order in which they were asked for
 
     def slot(self, label):
         variant = str(label).split(",")[0]  # "lpfdm, ppc = 2" looks like lpfdm
@@ -55,14 +56,21 @@ class Style:
         return COLOURS[self.slot(label) % len(COLOURS)]
 
     def marker(self, label):
-        return MARKERS[self.slot(label) % len(MARKERS)]
+        return MARKERS[(self.slot(label) + 3 * self.kind(label)) % len(MARKERS)]
 
     def line(self, label):
-        return LINES[self.slot(label) % len(LINES)]
+        return LINES[(self.slot(label) + self.kind(label)) % len(LINES)]
+
+    def kind(self, label):
+        """Which of the labels of a variant this is: they share its colour, not its marker and line."""
+        labels = self.kinds.setdefault(str(label).split(",")[0], [])
+        if "," in str(label) and label not in labels:
+            labels.append(label)
+        return labels.index(label) if label in labels else 0
 
     def of(self, label):
         return {"color": self.colour(label), "marker": self.marker(label), "linestyle": self.line(label),
-                "markerfacecolor": "white" if self.slot(label) % 2 else self.colour(label), "markeredgewidth": 0.9,
+                "markerfacecolor": "white" if (self.slot(label) + self.kind(label)) % 2 else self.colour(label), "markeredgewidth": 0.9,
                 "gid": gid_of(label)}
 
 

@@ -6,11 +6,12 @@ LIST = Path(__file__).with_name("references.bib")
 
 
 def used(run):
-    """What a run uses, in the keywords of the list: method, variant, options of it, case, local damping, nonlocal softening."""
+    """What a run uses, in the keywords of the list: method, variant, options of it, case, kinds of damping, nonlocal softening."""
     scene = run.result.resolved
     words = {"" if run.outside else run.result.method, run.name.split("[")[0], str(run.values.get("case", "")), *re.findall(r"[\[,]\s*\w+\s*=\s*(\w+)", run.name)}
-    if isinstance(scene.get("damping"), dict) and scene["damping"].get("local"):
-        words.add("local damping")
+    damping = scene.get("damping")
+    if isinstance(damping, dict):
+        words |= {f"{kind} damping" for kind in ("local", "kinetic") if damping.get(kind)}
     softening = [m.get("softening") for m in scene.get("material", []) if isinstance(m.get("softening"), dict)]
     return words | ({"nonlocal"} if any("length" in table for table in softening) else set())
 
