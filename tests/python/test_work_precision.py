@@ -6,6 +6,7 @@ from synthetic import write_study
 from testbed_reports.page import bench
 from testbed_reports.grade.dataset import read_study_folder
 from testbed_reports.page.report import build
+from testbed_reports.draw.style import Style
 from testbed_reports.draw.work_precision import Cost, cheapest, costs_of, error_of, front, is_busy, reach
 
 FIGURES = """
@@ -82,7 +83,21 @@ def test_bench_in_a_report(tmp_path):
     assert "Measured on a busy machine" in page and "Triad bandwidth: 10.0 GB/s with 1 thread, 10.0 GB/s with 2 threads" in page
     assert (tmp_path / "out/figures/b_bench_rates.pdf").is_file() and (tmp_path / "out/tables/b_bench_cost.csv").is_file()
     table = bench.cost_table(bench.read_bench(tmp_path / "b/bench.csv")[1])
-    assert table.rows[0][2].startswith("1.00") and table.rows[0][3].startswith("1.00")
+    assert table.rows[0][:3] == ["lpfdm", "block", "4 × 4"] and table.rows[0][3].startswith("1.00") and table.rows[0][4].startswith("1.00")
+
+
+def test_what_few_points_keep_of_the_rate(tmp_path):
+    """Seconds a step: 2e-8 a point at 4 x 4, four times that at 2 x 2; half of the rate at 300 points."""
+    line = "lpfdm,elastic,{n},9,1,100,1,{s},1,90,112,1e10,0.5,1,\"a: 1\",block,{c}"
+    rows = [line.format(n=n, s=2e-8 * n * factor, c=c) for n, c, factor in ((300, 4, 2), (10000, 4, 1), (324, 2, 8), (9900, 2, 4))]
+    (tmp_path / "bench.csv").write_text("\n".join(["method,law," + ",".join(bench.NUMBERS) + ",phases,scene,points_per_cell", *rows]) + "\n")
+    _, read = bench.read_bench(tmp_path / "bench.csv")
+    table = bench.kept_table(read)
+    assert table.header[2:] == ["2 × 2, 300 points", "2 × 2, 10000 points", "4 × 4, 300 points over 10000 points"]
+    assert table.rows == [["lpfdm", "block", "0.25", "0.25", "0.50"]]
+    assert bench.kept_table([r for r in read if r["threads"] > 1]) is None
+    figure = bench.rates_figure(read, Style(["lpfdm"]))
+    assert [axis.get_title() for axis in figure.axes if axis.get_visible()] == ["Block, 4 × 4", "Block, 2 × 2"]
 
 
 def test_a_broken_bench_is_told(tmp_path):

@@ -110,7 +110,7 @@ def _bench_section(path, style, out, ledger, failures):
         shown = {"title": "Particle-steps per second against the number of points", "image": image, "svg": svg, "points": [], "error": "", "width": "page",
                  "rem": 62, "anchor": f"figure-{own}_rates", "paper": "", "shows": [], "caption": [caption], "runs": []}
     plt.close("all")
-    tables = [t for t in (bench.rates_table(rows), bench.cost_table(rows)) if t]
+    tables = [t for t in (bench.rates_table(rows), bench.kept_table(rows), bench.cost_table(rows)) if t]
     for table in tables:
         write_table(out, own, table)
     purpose = "The particle methods alone, in one process, beside the bandwidth of the memory." + (" Measured on a busy machine." if bench.is_busy(comment) else "")
