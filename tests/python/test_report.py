@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import pytest
 from conftest import REPORTS
@@ -14,7 +15,7 @@ from testbed_reports.draw.figures import draw
 from testbed_reports.page.report import build, main
 from testbed_reports.draw.style import Style
 from testbed_reports.draw.table import Table, as_latex, escape
-from testbed_reports.page.tables import convergence_table, performance_table, power_law_table, study_tables
+from testbed_reports.page.tables import convergence_table, performance_table, power_law_table, slow_runs, study_tables
 
 EXTRA = """
 [[target]]
@@ -199,6 +200,15 @@ def test_performance_medians(tmp_path):
                                           change=lambda v, L, r: {"solve_s": [1.0, 5.0, 2.0][r - 1]}))
     row = dict(zip(performance_table(study).header, performance_table(study).rows[0]))
     assert row["solve [s]"] == "2.00 [1.00–5.00]" and row["memory [B/point]"] == "200"
+
+
+def test_runs_below_the_rate_of_their_scene_are_told():
+    """Small runs are slow by themselves; one with more points than another has no reason to be."""
+    def run(points, rate):
+        return SimpleNamespace(result=SimpleNamespace(performance={"points": points, "particle_steps_per_second": rate}))
+    small, middle, lagging, large = run(300, 4e6), run(10000, 2e7), run(10000, 0.9e7), run(1e5, 1.1e7)
+    assert slow_runs([small, middle, lagging, large, SimpleNamespace(result=None)]) == [lagging]
+    assert slow_runs([small, middle, run(1e5, 0.9e7)])[0].result.performance["points"] == 1e5
 
 
 def test_power_law_of_all_seeds(tmp_path):

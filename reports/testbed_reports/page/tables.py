@@ -139,12 +139,23 @@ def _values(name, title, series, keys):
     return Table(name, title, ["variant", *what], [[label, *(text(runs, key) for key in keys)] for label, runs in series.items()])
 
 
+def slow_runs(runs):
+    """Those of one series that do less than half of the particle-steps a second that another does with as many points, or fewer."""
+    rated = [(float(r.result.performance.get("points", 0)), float(r.result.performance.get("particle_steps_per_second", 0)), r)
+             for r in runs if r.result is not None]
+    return [run for points, rate, run in rated
+            if 0 < rate < 0.5 * max(other for fewer, other, _ in rated if fewer <= 1.1 * points)]
+
+
 def performance_table(study):
     """Timings per variant and cell size; runs on a busy machine are marked."""
-    cores, rows, busy_any = study.plan.get("cores"), [], False
+    cores, rows, busy_any, slow_any = study.plan.get("cores"), [], False, False
     for label, runs in groups(study.runs).items():
+        slow = slow_runs(runs)
         for size in sorted({r.values.get("L") for r in runs if r.result is not None}, reverse=True):
             own = [r for r in runs if r.values.get("L") == size and r.result is not None]
+            slow_here = any(r in slow for r in own)
+            slow_any = slow_any or slow_here
             perf = [r.result.performance for r in own]
             loads = [r.result.provenance.get("load_average") for r in own]
             loads = [float(v) for v in loads if isinstance(v, (int, float))]
@@ -152,7 +163,7 @@ def performance_table(study):
             busy_any = busy_any or busy
             rows.append([label, f"{size:g}", _whole(perf[0].get("points")), _whole(perf[0].get("steps")),
                          *(_range([p.get(k) for p in perf]) for k in ("solve_s", "setup_s", "output_s")),
-                         _range([p.get("particle_steps_per_second") for p in perf]),
+                         _range([p.get("particle_steps_per_second") for p in perf]) + (" slow" if slow_here else ""),
                          number(float(perf[0].get("bytes_per_point", math.nan))),
                          (f"{max(loads):.2f}" if loads else "n/a") + (" busy" if busy else ""),
                          ", ".join(dict.fromkeys(r.label for r in own if r.suspect or not r.completed))])
@@ -163,6 +174,8 @@ def performance_table(study):
         notes.append(f"Runs went {study.plan['jobs']} at a time: timings are those of a shared machine.")
     if busy_any:
         notes.append(f"busy: at the start as many others ran as there are cores ({cores}), or, where a file does not tell, the load average was above that.")
+    if slow_any:
+        notes.append("slow: less than half of the rate that the same method has in this scene with as many points, or fewer: look at the load, or for numbers below 1e-308.")
     header = ["variant", "L [m]", "points", "steps", "solve [s]", "set-up [s]", "output [s]", "particle steps [1/s]",
               "memory [B/point]", "load", "status"]
     return Table("performance", "Performance", header, rows, notes=notes, folded=True)
