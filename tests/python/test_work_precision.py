@@ -6,8 +6,10 @@ from synthetic import write_study
 from testbed_reports.page import bench
 from testbed_reports.grade.dataset import read_study_folder
 from testbed_reports.page.report import build
+from testbed_reports.draw.figures import draw
 from testbed_reports.draw.style import Style
 from testbed_reports.draw.work_precision import Cost, cheapest, costs_of, error_of, front, is_busy, reach
+from testbed_reports.read.study_file import StudyError
 
 FIGURES = """
 [[figure]]
@@ -26,6 +28,41 @@ norm = "l2"
 x = "dofs"
 y = "solve_s"
 """
+
+
+PEERS = """
+[[figure.peer]]
+series = "lpfdm"
+L = [2.0, 1.0, 0.125]
+error = [0.1, 0.1, 0.1]
+seconds = [{seconds}, {seconds}, 9.0]
+[[figure.peer]]
+name = "other 1.0, static"
+L = [1.0, 0.5]
+error = [0.3, 0.1]
+seconds = [2.0, 8.0]
+"""
+
+
+def test_other_codes_are_scaled_by_the_rows_measured_beside_them(tmp_path):
+    figure = FIGURES.split("[[figure]]")[1]
+    plain = read_study_folder(write_study(tmp_path / "a", "[[figure]]" + figure, sizes=(2.0, 1.0), change=lambda *_: {"solve_s": 3.0}))
+    assert not draw(plain, plain.spec.figures[0], Style(["lpfdm"])).notes[-1].startswith("Brown")
+    study = read_study_folder(write_study(tmp_path / "b", "[[figure]]" + figure + PEERS.format(seconds=2.0), sizes=(2.0, 1.0), change=lambda *_: {"solve_s": 3.0}))
+    drawing = draw(study, study.spec.figures[0], Style(["lpfdm"]))
+    assert any("scaled by 1.5," in note for note in drawing.notes)
+    (line,) = [line for line in drawing.figure.axes[0].lines if list(line.get_ydata()) == [0.3, 0.1]]
+    assert list(line.get_xdata()) == [3.0, 12.0]
+    assert "other 1.0, static" in [text.get_text() for text in drawing.figure.legends[0].get_texts()]
+    low, high = drawing.figure.axes[0].get_xlim()
+    assert low < 3.0 and high > 12.0
+
+
+@pytest.mark.parametrize("text, told", [(PEERS.replace('series = "lpfdm"', 'name = "x"'), "lack a row of this testbed"), (PEERS.replace("[2.0, 8.0]", "[2.0]"), "of one length"),
+                                        (PEERS.replace("[2.0, 8.0]", "[2.0, 0.0]"), "above zero"), (PEERS.replace("name =", "nome ="), "nome")])
+def test_peers_that_say_too_little_are_refused(tmp_path, text, told):
+    with pytest.raises(StudyError, match=told):
+        read_study_folder(write_study(tmp_path / "a", "[[figure]]" + FIGURES.split("[[figure]]")[1] + text.format(seconds=2.0), sizes=(1.0,)))
 
 
 @pytest.fixture(scope="module")

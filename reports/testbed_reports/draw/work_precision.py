@@ -9,8 +9,9 @@ from matplotlib.ticker import NullFormatter
 from ..grade import metrics
 from ..grade.targets import number
 from ..read.figure_tables import figure_kind
-from ..read.study_reader import NUMBER, TEXT
+from ..read.study_reader import LIST, NUMBER, TEXT
 from .drawing import Drawing, FigureError, by_series, chosen, exact_of, log_y, lower_edge, name_of, rails
+from .peers import check_peers, peers_of
 from .style import WIDTH, frame, legend_below, legend_shape
 
 AXES = {"solve_s": "Solve time [s]", "dofs": "Degrees of freedom"}
@@ -131,10 +132,10 @@ def _cap(series, exact):
                     default=math.inf)
 
 
-def _scale_x(axis, series, failing, x):
-    """Wide enough for all costs, the range of times, and the runs without a number."""
+def _scale_x(axis, series, failing, x, peers):
+    """Wide enough for all costs, the range of times, the runs without a number and other codes."""
     costs = [c for own in series.values() for c in own]
-    every = [getattr(c, x) for c in costs] + [a for at in failing.values() for a in at]
+    every = [getattr(c, x) for c in costs] + [a for at in failing.values() for a in at] + peers.seconds
     if x == "solve_s":
         every += [t for c in costs for t in (c.least_s, c.most_s)]
     axis.set_xlim(min(every) / 1.5, max(every) * 1.5)
@@ -161,11 +162,14 @@ def _check_keys(reader, entry, index):
     if axes not in (("solve_s", "error"), ("dofs", "error"), ("dofs", "solve_s")):
         reader.fail(f"'x' and 'y' in [[figure]] number {index + 1} must be solve_s and error, dofs and error, or dofs and solve_s",
                     "x" if "x" in entry else "y", "figure", index)
+    if "peer" in entry and axes != ("solve_s", "error"):
+        reader.fail(f"[[figure]] number {index + 1} has peers, which have seconds and errors alone: 'x' and 'y' must be solve_s and error", "peer", "figure", index)
+    check_peers(reader, entry, index)
     if entry.get("exact") == 0:
         reader.fail(f"'exact' in [[figure]] number {index + 1} must not be zero: errors are relative to it", "exact", "figure", index)
 
 
-@figure_kind("work_precision", {"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "y": TEXT, "exact": NUMBER}, _check_keys)
+@figure_kind("work_precision", {"quantity": TEXT}, {"norm": TEXT, "x": TEXT, "y": TEXT, "exact": NUMBER, "peer": LIST}, _check_keys)
 def work_precision(study, entry, style):
     """Error against seconds or unknowns, or seconds against unknowns. Where a method ran with several settings at one cell size, all are
     shown and its line joins those that nothing of its own beats (against unknowns: the fastest)."""
@@ -175,9 +179,11 @@ def work_precision(study, entry, style):
     exact = exact_of({label: [c.error for c in costs] for label, costs in series.items()}) if is_error else set()
     texts = {label: f"{label}: exact (≤ {number(max(c.error for c in costs))})" if label in exact else label for label, costs in series.items()}
     width = WIDTH[entry.get("width", "column")]
-    columns, rows = legend_shape(texts.values(), width)
+    peers = peers_of(entry, series)
+    columns, rows = legend_shape([*texts.values(), *(name for name, _, _ in peers.lines)], width)
     figure, axes = frame(width, 2.3, rows, rails=len(failing), left=0.62, right=0.12)
     axis, handles = axes[0, 0], [Line2D([], [], **style.of(label), label=text) for label, text in texts.items()]
+    peers.draw(axis)
     if y == "error":
         best = front([p for costs in series.values() for p in _points(costs, x, y)])
         _draw_front(axis, [p for p in best if p[1] > metrics.ROUNDING or not is_error])
@@ -191,15 +197,16 @@ def work_precision(study, entry, style):
         notes.append("Circled: timed on a busy machine")
     axis.set_xscale("log")
     axis.set_yscale("log")
-    heights = [getattr(c, y) for label, costs in series.items() if label not in exact for c in costs]
+    heights = [getattr(c, y) for label, costs in series.items() if label not in exact for c in costs] + peers.errors
     cap = _cap(series, exact) if is_error else math.inf
     if max(heights) > 1.6 * cap:
         notes.append("Errors above the upper edge are off the scale")
     log_y(axis, min(heights) / 1.6, min(max(heights), cap) * 1.6)
-    _scale_x(axis, series, failing, x)
+    _scale_x(axis, series, failing, x, peers)
     axis.set_ylabel(_title(entry, y))
     rails(axis, failing, style, "failed")
-    legend_below(figure, handles, columns)
+    legend_below(figure, handles + peers.handles(), columns)
+    notes += peers.notes
     if exact:
         notes.append("Methods that are exact to rounding stand on the lower edge")
     if "solve_s" in (x, y):
