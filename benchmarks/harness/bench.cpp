@@ -264,8 +264,8 @@ void bench(const BenchOptions& options)
             }
             catch (const Diverged& e)
             {
-                fmt::print("{:<16} {:<10} {:>6} {:>9.0f} {:>7} diverged: {}\n", item.method, item.scene.name, item.points_per_cell,
-                           item.points, plan.teams[k], e.what());
+                fmt::print("{:<16} {:<10} {:>6} {:>9.0f} {:>7} diverged: {}\n", item.method, item.scene.name,
+                           fmt::format("{0} x {0}", item.points_per_cell), item.points, plan.teams[k], e.what());
             }
     if (!options.output.empty() && !csv)
         throw OutputError(fmt::format("writing '{}' failed (disk full?)", options.output));

@@ -16,6 +16,11 @@ double cells_of_square(double points, int points_per_cell)
 {
     return std::max(1.0, std::round(std::sqrt(points) / points_per_cell));
 }
+/// A multiple of five, as the size of some lattices asks for.
+double fives_of_square(double points, int points_per_cell)
+{
+    return 5 * std::max(1.0, std::round(std::sqrt(points) / points_per_cell / 5));
+}
 Settings with(int points_per_cell, const std::string& size)
 {
     return {fmt::format("constants.ppc={}", points_per_cell), size};
@@ -40,12 +45,12 @@ Settings cliff(double points, int points_per_cell)
 /// Two squares of the width a, one on the other.
 Settings dam_break(double points, int points_per_cell)
 {
-    return with(points_per_cell, fmt::format("grid.cell_size=a/{}", cells_of_square(points / 2, points_per_cell)));
+    return with(points_per_cell, fmt::format("grid.cell_size=a/{}", fives_of_square(points / 2, points_per_cell)));
 }
 /// Two squares of the height of 0.1 m beside each other.
 Settings collapse(double points, int points_per_cell)
 {
-    return with(points_per_cell, cell_size(0.1 / cells_of_square(points / 2, points_per_cell)));
+    return with(points_per_cell, cell_size(0.1 / fives_of_square(points / 2, points_per_cell)));
 }
 /// 20 m by 20 m, and the door of 2 m is a whole number of cells.
 Settings trapdoor(double points, int points_per_cell)

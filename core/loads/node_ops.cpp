@@ -112,29 +112,44 @@ void NodeOps::add_work(const Kick& kick, double loads, double dt, NodalWork& wor
 
 std::optional<double> NodeOps::kick(Nodes<2>& nodes, double dt)
 {
-    const double before = is_loaded_ ? load_power(nodes) : 0;
+    const double moving = has_kinetic_damping_ ? kinetic_energy(nodes) : 0, before = is_loaded_ ? load_power(nodes) : 0;
     const Kick kick = damping_ ? accelerate(nodes, weight_of(nodes), dt, *damping_) : accelerate(nodes, weight_of(nodes), dt);
     add_work(kick, is_loaded_ ? 0.5 * (before + load_power(nodes)) : 0, dt, work_);
-    if (!has_kinetic_damping_ || kick.work >= 0)
+    const bool falls = kick.work < 0 || moving < std::exchange(moving_, moving);
+    if (!has_kinetic_damping_ || !falls)
         return {};
-    const double energy = kinetic_energy(nodes);
-    stop(nodes, dt, energy);
-    return energy - kick.work;
+    moving_ = 0;
+    stop(nodes, dt, moving + kick.work);
+    return moving;
 }
 
 void NodeOps::stop(Nodes<2>& nodes, double dt, double energy)
 {
-    const auto second_half = [&] { return 0.5 * dt * nodal_power(nodes); };
-    const double kept = energy - second_half();
-    work_ = work(nodes, -0.5 * dt);
-    nodes.for_each(
-        [&](std::size_t i, const auto& lanes)
-        {
-            const Pack half = inverse_mass(nodes, i, lanes) * Pack(0.5 * dt);
-            unrolled<2>([&](auto d) { lanes.store(&nodes.v[d][i], half * lanes.load(&nodes.f[d][i])); });
-        });
-    work_ = work(nodes, 0.5 * dt);
-    work_.note_stopped(kept + second_half() - kinetic_energy(nodes));
+    const std::vector<double>& weight = weight_of(nodes);
+    double loads = is_loaded_ ? load_power(nodes) : 0;
+    const auto s = sum_over_nodes<4>(nodes,
+                                     [&](std::size_t i, const auto& lanes)
+                                     {
+                                         const Pack step = inverse_mass(nodes, i, lanes) * Pack(dt), w = lanes.load(&weight[i]);
+                                         const auto f = load(nodes.f, i, lanes), v = load(nodes.v, i, lanes);
+                                         Vec<2, Pack> half, way;
+                                         std::array<Pack, 4> sums{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
+                                         unrolled<2>(
+                                             [&](auto d)
+                                             {
+                                                 half[d] = Pack(0.5) * step * f[d];
+                                                 way[d] = Pack(0.5 * dt) * (half[d] - v[d]);
+                                                 sums[0] += f[d] * way[d];
+                                                 sums[1 + d] = w * way[d];
+                                                 if (damping_)
+                                                     sums[3] += damping_->taken(f[d], v[d] - step * f[d]) * way[d];
+                                             });
+                                         store(nodes.v, i, lanes, half);
+                                         return sums;
+                                     });
+    loads -= is_loaded_ ? load_power(nodes) : 0;
+    add_work({s[0], {s[1], s[2]}, s[3]}, loads, -0.5 * dt, work_);
+    work_.note_stopped(energy + s[0] - kinetic_energy(nodes));
 }
 
 NodalWork NodeOps::work(const Nodes<2>& nodes, double lag) const

@@ -172,9 +172,10 @@ public:
     }
     /// Power that hourglass control takes from the motion in the coming kick [W/m].
     void note_hourglass(double power) { power_.hourglass = power; }
-    /// Accelerates, and adds up the work of all forces. Kinetic damping then stops the nodes if that took kinetic energy from them: the
-    /// peak, at which the slowest mode passes its equilibrium, is behind them (Cundall 1976; Barnes 1999, Int. J. Space Struct. 14).
-    /// Returns the energy that they had before, if it did [J/m].
+    /// Accelerates, and adds up the work of all forces. Kinetic damping then stops the nodes if the kinetic energy has begun to fall, by
+    /// this kick or since the last one, as where points take what nodes gain: the peak, at which the slowest mode passes its equilibrium,
+    /// is behind them (Cundall 1976; Barnes 1999, Int. J. Space Struct. 14). Returns the energy that they had before the kick, if it did
+    /// [J/m].
     std::optional<double> kick(Nodes<2>& nodes, double dt);
     /// Work up to the time of the forces, `lag` seconds after that of the nodes' velocity.
     NodalWork work(const Nodes<2>& nodes, double lag) const;
@@ -186,6 +187,8 @@ public:
     {
         for (std::size_t k = 0; k < walls_.size(); ++k)
             a.group("wall/" + restraints_[first_wall_ + k].name, [&] { walls_[k].state(a, restraints_[first_wall_ + k]); });
+        if (has_kinetic_damping_)
+            a.value("moving", "J/m", moving_);
         if constexpr (Archive::reads)
         {
             seen_ = 0;
@@ -216,6 +219,7 @@ private:
     const std::vector<double>* weight_ = nullptr;  ///< null: all mass has weight
     std::optional<LocalDamping> damping_;
     bool has_kinetic_damping_ = false;
+    double moving_ = 0;                  ///< kinetic energy before the last kick, for kinetic damping; zero after a stop [J/m]
     std::vector<Restraint> restraints_;  ///< of the boundaries, then of the walls: where two prescribe, the later one does
     std::vector<Wall> walls_;
     std::size_t first_wall_ = 0;

@@ -68,6 +68,10 @@ void check_kinetic_damping(const Scene& scene, Problems& problems)
     for (std::size_t k = 0; k < scene.bodies.size(); ++k)
         if (scene.bodies[k].velocity)
             refuse(fmt::format("body[{}].velocity", k), "an initial velocity");
+    if (scene.may_flow())
+        problems.warn("damping.kinetic",
+                      "what yields remembers the way to rest, and between two stops a body swings beyond its equilibrium: "
+                      "for elastic bodies; damping.local with a slow gravity.ramp does not overshoot");
     for (std::size_t k = 0; k < scene.walls.size(); ++k)
         if (scene.walls[k].velocity)
             refuse(fmt::format("wall[{}].velocity", k), "a moving wall");
