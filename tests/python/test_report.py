@@ -265,6 +265,8 @@ def test_same_variant_same_look():
     assert str(Style(["mpm-x", "lpfdm"]).of("lpfdm")) == looks[0]  # the same in every report
     slow, fast = (style.of(f"lpfdm, cfl = {cfl}") for cfl in (0.1, 0.9))  # settings of one are told apart, even in grey
     assert slow["color"] == fast["color"] and all(slow[k] != fast[k] for k in ("marker", "linestyle", "markerfacecolor"))
+    style.begin_figure()
+    assert style.of("lpfdm, cfl = 0.9") | {"gid": ""} == style.of("lpfdm") | {"gid": ""}
 
 
 def test_every_run_lost_still_makes_a_page(tmp_path):

@@ -9,6 +9,7 @@ from .drawing import FigureError
 
 def draw(study, entry, style):
     """Draws one declared figure; raises FigureError or ResultError with the reason when it cannot."""
+    style.begin_figure()
     try:
         return FIGURE_KINDS[entry["kind"]].draw(study, entry, style)
     except (FigureError, ResultError):

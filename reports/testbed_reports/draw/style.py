@@ -39,6 +39,10 @@ class Style:
         self.slots = {label: KNOWN.index(label) for label in self.labels if label in KNOWN}
         free = (k for k in itertools.count() if k not in set(self.slots.values()))
         self.slots.update({label: k for label, k in zip((v for v in self.labels if v not in KNOWN), free)})
+        self.begin_figure()
+
+    def begin_figure(self):
+        """A variant with one setting looks in each figure as it does without."""
         self.kinds = {}  # of a variant: its labels with further settings, in the order in which they were asked for
 
     def slot(self, label):
