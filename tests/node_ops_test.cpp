@@ -107,6 +107,26 @@ TEST(KineticDamping, StopsANodeBehindItsPeak)
     EXPECT_GT(work.damping, 0.9 * v_before * v_before);
 }
 
+/// What local damping takes in the half of the kick that a stop leaves out goes by the velocity that it was made with, here of the other
+/// sign.
+TEST(KineticDamping, TakesBackWhatLocalDampingTook)
+{
+    const Scene scene = test::load(test::soil_block({0, 0}, {1, 1}) + "[damping]\nkinetic = true\nlocal = 0.3\n", "lpfdm");
+    NodeOps ops(scene, make_lattice(scene.grid));
+    Nodes<2> nodes(1);
+    nodes.set_active({0});
+    nodes.mass = {2};
+    nodes.v[0] = {1};
+    nodes.f[0] = {-30};
+    const double dt = 0.1, force = -30, taken = LocalDamping{0.3}.taken(Pack(force), Pack(1.0))[0];
+    const double after = 0.5 * dt * force / 2, way = 0.5 * dt * (1 + after);
+    ASSERT_TRUE(ops.kick(nodes, dt));
+    EXPECT_DOUBLE_EQ(nodes.v[0][0], after);
+    const NodalWork& work = ops.work_done();
+    EXPECT_NEAR(work.kick, after * after - 1, 1e-12);
+    EXPECT_NEAR(work.kick + work.damping, (force + taken) * way, 1e-12);
+}
+
 /// With MUSL the points take what kicks give to the nodes: no kick takes energy, and yet it falls.
 TEST(KineticDamping, StopsWhereEnergyFallsBetweenKicks)
 {
