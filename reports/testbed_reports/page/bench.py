@@ -69,11 +69,11 @@ def cost_table(rows):
 def kept_table(rows):
     """What is kept of the rate at 4 x 4 points per cell with fewer, and at the smallest size of that at 1e4 points; one thread. None without such pairs."""
     one = [r for r in rows if r["threads"] == 1.0]
-    if not one:
-        return None
-    sizes = sorted({_size(r) for r in one})
     counts = [c for c in sorted({r["a_cell"] for r in one}) if c < 4]
     rate = {(r["method"], r["scene"], r["a_cell"], _size(r)): 1.0 / r["fastest_seconds_per_step"] * r["points"] for r in one}
+    sizes = sorted({size for method, scene, count, size in rate if count < 4 and (method, scene, 4, size) in rate})
+    if not sizes:
+        return None
     table = []
     for method, scene in dict.fromkeys((r["method"], r["scene"]) for r in one):
         ratio = lambda count, size, of, at: (f"{rate[method, scene, count, size] / rate[method, scene, of, at]:.2f}"  # noqa: E731
