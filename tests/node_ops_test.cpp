@@ -18,6 +18,17 @@ Nodes<2> two_nodes()
     nodes.f[0] = {10, 11, 12};
     return nodes;
 }
+
+/// Of a mass of 2.
+Nodes<2> one_node(double velocity, double force)
+{
+    Nodes<2> nodes(1);
+    nodes.set_active({0});
+    nodes.mass = {2};
+    nodes.v[0] = {velocity};
+    nodes.f[0] = {force};
+    return nodes;
+}
 }  // namespace
 
 TEST(Gravity, RampsSmoothly)
@@ -113,12 +124,8 @@ TEST(KineticDamping, TakesBackWhatLocalDampingTook)
 {
     const Scene scene = test::load(test::soil_block({0, 0}, {1, 1}) + "[damping]\nkinetic = true\nlocal = 0.3\n", "lpfdm");
     NodeOps ops(scene, make_lattice(scene.grid));
-    Nodes<2> nodes(1);
-    nodes.set_active({0});
-    nodes.mass = {2};
-    nodes.v[0] = {1};
-    nodes.f[0] = {-30};
     const double dt = 0.1, force = -30, taken = LocalDamping{0.3}.taken(Pack(force), Pack(1.0))[0];
+    Nodes<2> nodes = one_node(1, force);
     const double after = 0.5 * dt * force / 2, way = 0.5 * dt * (1 + after);
     ASSERT_TRUE(ops.kick(nodes, dt));
     EXPECT_DOUBLE_EQ(nodes.v[0][0], after);
@@ -132,10 +139,7 @@ TEST(KineticDamping, StopsWhereEnergyFallsBetweenKicks)
 {
     const Scene scene = test::load(test::soil_block({0, 0}, {1, 1}) + "[damping]\nkinetic = true\n", "lpfdm");
     NodeOps ops(scene, make_lattice(scene.grid));
-    Nodes<2> nodes(1);
-    nodes.set_active({0});
-    nodes.mass = {2};
-    nodes.f[0] = {10};
+    Nodes<2> nodes = one_node(0, 10);
     const auto stops = [&] { return ops.kick(nodes, 0.1).has_value(); };
     EXPECT_FALSE(stops());
     EXPECT_FALSE(stops());

@@ -106,12 +106,6 @@ struct Weights
     }
 };
 
-template <class Support, int dim, AnyPack Pack>
-TESTBED_INLINE inline auto weights_at(const Corner<dim, Pack>& c)
-{
-    return Weights<Support, dim, Pack>(c);
-}
-
 /// The middles of a pack of boxes in their bin, and their half widths [cells]; points without a box have none.
 template <int dim, AnyPack Pack = testbed::Pack>
 struct Box

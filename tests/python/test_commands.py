@@ -136,6 +136,14 @@ def test_bench_refuses_what_it_cannot_measure(arguments):
     assert done.returncode == 1 and arguments[0] in done.stderr
 
 
+def test_bench_fits_flows_to_any_number_of_points(tmp_path):
+    """Their lattices take some cell sizes alone."""
+    sizes = ["--points", "100", "700", "--points-per-cell", "1", "3", "--seconds", "0.01", "--threads", "1"]
+    done = run("bench", "--method", "lpfdm-2000", "--scene", "dam_break", "collapse", "trapdoor", *sizes, "-o", tmp_path / "bench.csv")
+    assert done.returncode == 0, done.stderr
+    assert len((tmp_path / "bench.csv").read_text().splitlines()) == 2 + 3 * 4
+
+
 @pytest.mark.parametrize("limit", [1000, 30000, 100000])
 def test_full_disk_leaves_no_half_result(tmp_path, limit):
     done = run("run", COLUMN, "-o", tmp_path / "r.h5",
